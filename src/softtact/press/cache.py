@@ -1,4 +1,4 @@
-"""What a sensor's fast models start from: computed once for a sensor, and kept in the user's cache."""
+"""Prepared data of a sensor's fast models, computed once for a sensor and kept in the user's cache."""
 
 import math
 import os
@@ -22,12 +22,12 @@ _FORMAT = 12    # of the files; another one makes them again
 
 
 def _of_layer(spec):
-    """What of a sensor its elastic layer depends on, and nothing else: not its name, frusta, taxels or friction."""
+    """The values on which a sensor's elastic layer depends: not its name, frusta, taxels or friction."""
     return [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer), spec.edge.held_below_mm, spec.base_held]
 
 
 def _of_frusta(spec):
-    """What of a sensor its slab on frusta depends on, beside the laws."""
+    """The values on which a sensor's slab on frusta depends, in addition to the laws."""
     return [spec.footprint_mm, spec.map_shape, repr(spec.dielectric.frusta), spec.dielectric.sheet_thickness_mm,
             spec.cover.thickness_mm, spec.edge.held_below_mm, spec.tips_bonded, repr(spec.friction)]
 
@@ -65,7 +65,7 @@ def cached_frustum_law(spec: SensorSpec, law: Law) -> FrustumLaw:
 
 
 def seconds_to_prepare_foundation(spec: SensorSpec, laws: Mapping[str, Law]) -> float:
-    """About how long `cached_foundation` takes, on two cores; 0 where it was computed before."""
+    """Estimated time of `cached_foundation` on two cores; 0 if it is cached."""
     return 0.0 if _file("foundation", _of_foundation(spec, laws)).exists() else _seconds(spec, *_FOUNDATION_TAKES)
 
 
@@ -85,7 +85,7 @@ def _about(spec, seconds, power):
 
 
 def _seconds(spec, seconds, power):
-    """How long it takes: seconds for the paper's sensor, which grow with a power of the map's points."""
+    """Estimated time: `seconds` for the paper's sensor, scaled by a power of the number of the map's points."""
     return seconds * (math.prod(spec.map_shape) / _POINTS) ** power
 
 

@@ -1,10 +1,10 @@
-"""Which model a press takes: the error that each cheaper model is expected to make, or the paper's count of mesh points.
+"""Choice of the model of a press: by the expected error of each cheaper model, or by the paper's count of mesh points.
 
-`error`: the cheapest model that is within the tolerance in nine of ten presses and whose load steps all hold. Both fast models are
-pressed first, in about a second. What they disagree by is the elastic model's error, for the foundation model is nearer to the
-hyperelastic one by an order of magnitude; that of the foundation model grows with how far frusta are compressed and how deep the
-object is. A model that fails, or does not hold for a load step, falls through to the next; where the hyperelastic one does not hold
-either, the result says that none serves.
+`error`: the cheapest model that is within the tolerance in nine of ten presses and valid for all load steps. Both fast models are
+pressed first, in about a second. Their difference is the elastic model's error, since the foundation model is closer to the
+hyperelastic one by an order of magnitude; the foundation model's error grows with the compression of the frusta and the depth of
+the object. After a model that fails, or is not valid for a load step, the next one is tried; if the hyperelastic one is not valid
+either, the result states that no model is.
 `paper`: the hyperelastic model for an object with fine details, else the elastic one (`geometry.complexity`).
 Errors are root mean squares over the map, in mm, against the hyperelastic model; the largest of a press' load steps counts.
 """
@@ -102,13 +102,13 @@ def expected_errors(elastic: PressResult, foundation: PressResult, *, height_mm:
 
 
 def cheapest(errors: dict[str, np.ndarray], tolerance_mm: float) -> str:
-    """The first of elastic, foundation whose errors are all within the tolerance, else hyperelastic."""
+    """The first of elastic and foundation whose errors are all within the tolerance, else hyperelastic."""
     return next((name for name in ("elastic", "foundation") if name in errors and errors[name].max() <= tolerance_mm),
                 "hyperelastic")
 
 
 def with_expected_error(sensor: "Sensor", result: PressResult) -> PressResult:
-    """The result of a fast model with the error to expect of it, where the sensor has frusta, on which these were calibrated."""
+    """The result of a fast model with its expected error, if the sensor has frusta, for which the errors were calibrated."""
     if result.model not in ("elastic", "foundation") or np.isnan(sensor.spec.frustum_height_mm):
         return result
     if not np.isnan(np.asarray(result.expected_error_mm)).all():
@@ -120,14 +120,14 @@ def with_expected_error(sensor: "Sensor", result: PressResult) -> PressResult:
 
 
 def _with_interval(result, name):
-    """The result with the factors by which the true error is mostly smaller or larger than the expected one, as attributes."""
+    """The result with the percentiles of the true over the expected error as attributes."""
     low, high = INTERVALS[name]
     return replace(result, attributes=result.attributes | {"expected_error_times_low": low, "expected_error_times_high": high})
 
 
 def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course, *, policy: str,
                tolerance_mm: float) -> PressResult:
-    """A press with the model that a policy takes; the result holds which, why, and the error to expect."""
+    """A press with the model that a policy chooses; the result states the model, the reason and the expected error."""
     if policy not in POLICIES:
         raise InputError(f"The policy {policy!r} is unknown; use one of {', '.join(POLICIES)}.")
     if policy == "paper":
@@ -158,7 +158,7 @@ def models_to_prepare(sensor: "Sensor", *, policy: str) -> tuple[str, ...]:
 
 
 def _why_not_fast(sensor):
-    """Why the fast models are not asked for their errors, in words; empty where they are."""
+    """The reason in words why the fast models' errors are not computed; empty if they are."""
     if np.isnan(sensor.spec.frustum_height_mm):
         return f"{sensor.spec.name} has no frusta, on which the expected errors were calibrated"
     wait = sensor.seconds_to_prepare_foundation()

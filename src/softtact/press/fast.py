@@ -31,7 +31,7 @@ _NEAR_MM = 0.1            # height over the sensing surface, or depth below it, 
 
 
 def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
-    """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
+    """All load steps at once with the elastic model, which has only the surface's compliance and no body to keep."""
     start = time.perf_counter()
     sensor.prepared("elastic", course.threads)
     surface = HeightField(placed)
@@ -42,7 +42,7 @@ def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course:
 
 
 def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, *, model: str) -> np.ndarray:
-    """Maps (l, ny, nx) in mm of how much thinner a sensor becomes at rising forces (N): all that its readings need of a press.
+    """Maps (l, ny, nx) in mm of a sensor's reduction of thickness at rising forces (N), from which its readings follow.
 
     surface: the underside of an object;  model: elastic or foundation
     Raises InputError where the object is beside the sensor, ConvergenceError for a force that is not reached.
@@ -56,7 +56,7 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
 
 
 def _elastic(sensor, surface, forces, touch, *, patches=False):
-    """The `LayerPress` of an object by its underside, which touches after coming down by `touch`."""
+    """The `LayerPress` of an object given by its underside; touch: descent to first touch."""
     compliance = sensor.prepared("elastic")
     underside, stop = Underside(surface, compliance.grid), shell_stop_mm(sensor, surface)
 
@@ -84,12 +84,12 @@ def _not_as_deep(press, stop_mm):
 
 
 def first_touch_mm(sensor: "Sensor", surface: HeightField) -> float:
-    """Height (mm) of an object's underside over the sensing surface, from where its indentation counts."""
+    """Height (mm) of an object's underside over the sensing surface: its descent from the pose to first touch."""
     return surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
 
 
 def shell_stop_mm(sensor: "Sensor", surface: HeightField) -> float:
-    """How far (mm) an object comes down from its pose until it rests on the sensor's shell; infinite where it never does."""
+    """Descent (mm) of an object from its pose until it rests on the sensor's shell; infinite if it never does."""
     return shell_of(sensor).stop_mm(surface)
 
 
@@ -138,13 +138,13 @@ def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, c
 
 
 def _set_down(sensor: "Sensor", surface: HeightField) -> HeightField:
-    """The underside where it touches, if it is far from there: the model counts its first guesses from the sensing surface."""
+    """The underside moved to first touch if it is far away, since the model's first guesses start at the sensing surface."""
     away = first_touch_mm(sensor, surface)
     return surface if abs(away) <= _NEAR_MM else surface.moved(np.array([0.0, 0.0, -away]))
 
 
 def _steps_on_pad(compliance, points, forces, stop, touch):
-    """A `FoundationLoadStep` for each force (l,); once the object comes down to the shell, always that of rest on it."""
+    """A `FoundationLoadStep` for each force (l,); once the object rests on the shell, the same one for all larger forces."""
     steps, reached = press_foundation(compliance, points, forces), 0
     while reached < len(forces):
         try:
@@ -167,12 +167,12 @@ def _steps_on_pad(compliance, points, forces, stop, touch):
 
 
 def _exactly(forces, found):
-    """Forces (l,) that a solution agrees with up to its round-off, and what was found (l,) where they are others."""
+    """The prescribed forces (l,) where the computed ones agree with them to rounding, else the computed ones (l,)."""
     return np.where(np.abs(found - forces) <= _ROUND_OFF * forces, forces, found)
 
 
 def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_mm):
-    """The result of a foundation press' load steps whose times are noted, be it those before one that was not reached."""
+    """The result of the load steps of a foundation press whose times are recorded, also after a failed load step."""
     load_steps = load_steps[:len(times)]
     area, count = points.covered * compliance.grid.areas(points.nodes), len(load_steps)
     compression = np.array([load_step.compression.max() for load_step in load_steps])
@@ -190,9 +190,9 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
 
 
 def _within_reach(underside, points_within, foundation_modulus, forces, deepest, solve, depth_of):
-    """Points as far as the object may come down, and what `solve` makes of them; repeated with more where it came down further.
+    """Candidate points within the expected depth, and the result of `solve` for them; repeated with more points if it is deeper.
 
-    Beside the object the surface rises, so points a little above its depth can touch, too.
+    Beside the object the surface rises, so points slightly above its depth can touch too.
     """
     reach = REACH * underside.depth_on_springs(forces[-1], foundation_modulus) + LEAST_REACH_MM
     while True:
@@ -226,7 +226,7 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cour
 
 def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
                  threads: int = 1, limit_s: float | None = None) -> ElasticMotion:
-    """The `ElasticMotion` of a mesh placed in the sensor's frame; into `seconds` goes the time that each step took.
+    """The `ElasticMotion` of a mesh placed in the sensor's frame; the time of each step is appended to `seconds`.
 
     Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
     its `result`, where one is not reached.

@@ -22,7 +22,7 @@ from softtact.readout.registry import Samples
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
+_CORNER = 0.01            # share of a layer that may exceed the data: strains at an edge of the object always do
 
 
 def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, course: Course) -> PressResult:
@@ -58,7 +58,7 @@ def _load_steps(sensor, body, surface, forces, touch_mm):
 
 
 def _allowed(load_steps, sensor, surface, forces, touch_mm):
-    """The same, with a ConvergenceError at the first one that goes beyond the board or, in a motion, into the shell."""
+    """The load steps, with a ConvergenceError at the first one in which the object passes the board or, in a motion, the shell."""
     shell = shell_of(sensor)
     for number, load_step in enumerate(load_steps, start=1):
         _refuse_beyond_the_board(load_step, touch_mm, sensor.spec.deepest_mm)
@@ -69,12 +69,12 @@ def _allowed(load_steps, sensor, surface, forces, touch_mm):
 
 
 def _swept(surface, forces):
-    """The underside at all places of the object together, where the mesh is to be fine."""
+    """The envelope of the underside over all positions of the object, for the refinement of the mesh."""
     return SweptSurface(surface, forces.offsets_mm()) if isinstance(forces, Motion) and not forces.straight else surface
 
 
 def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
-    """Raise ConvergenceError where a tip that no contact point feels has gone farther down than the sensor is thick."""
+    """Raise ConvergenceError if a tip between the contact points is deeper than the sensor is thick."""
     depth = load_step.state.indentation - lowest_mm
     if depth > thickness_mm:
         raise ConvergenceError(
@@ -84,7 +84,7 @@ def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
 
 
 class _Record:
-    """The numbers of a press' load steps, and bodies where they are kept."""
+    """The numbers of a press' load steps, and the bodies if they are kept."""
 
     def __init__(self, sensor, body, touch_mm, course):
         self._sensor, self._body, self._touch_mm, self._course = sensor, body, touch_mm, course
@@ -95,14 +95,14 @@ class _Record:
         self._bodies: list[Any] = []
 
     def take(self, load_step):
-        """Read a load step; its time is noted by who asked for it."""
+        """Record the numbers of a load step; its time is recorded by the caller."""
         maps = self._sampling, self._lower, self._grid
         self._steps.append(_read_load_step(self._body, maps, load_step, from_mm=self._touch_mm))
         if self._course.keep_body:
             self._bodies.append(pressed_body(self._body, load_step.state))
 
     def result(self):
-        """The `PressResult` of the load steps whose time is noted: an interruption may come just before it is."""
+        """The `PressResult` of the load steps whose time is recorded: an interruption may come just before that."""
         sensor, times = self._sensor, self._course.reached.times
         steps = self._steps[:len(times)]
         pressure = [load_step["pressure"] for load_step in steps]

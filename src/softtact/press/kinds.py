@@ -1,4 +1,4 @@
-"""How sensors of each kind are loaded and pressed: one entry of `KINDS` for each kind of `sensors.specification.KINDS`.
+"""Loading and pressing sensors of each kind: one entry of `KINDS` for each kind of `sensors.specification.KINDS`.
 
 A kind from outside of the package: a class of specification and a `Kind`, each added to its registry under the kind's name.
 """
@@ -46,14 +46,14 @@ class Kind:
     load: Callable[[Any, dict[str, Law]], dict[str, Any]]
     """From its specification, and laws in place of those of its file, to the fields of `Sensor`."""
     models: Mapping[str, Press]
-    """What presses it, by the names of the models; `auto` among them."""
+    """Functions that press it by the names of the models, including `auto`."""
     at_rest: "Callable[[Sensor], SurfaceMotion]"
     """Its surface before any press, on which readouts are tried."""
     body: Callable[..., LayeredBody] | None = None
     """The body of the hyperelastic model, where that model presses it."""
 
     def press(self, model: str, sensor: str) -> Press:
-        """What presses with a model by its name. Raises InputError that names those that can."""
+        """The function that presses with a model. Raises InputError that names the available models."""
         if model in self.models:
             return self.models[model]
         if model not in MODELS:
@@ -118,7 +118,7 @@ def _by_forces(sensor, task, press, *, threads=1):
 
 
 def _by_motion(sensor, task, press, *, threads=1):
-    """A press that does more than go straight down by growing forces."""
+    """A press along a motion other than straight down by growing forces."""
     placed, finish = _placed(sensor, task)
     task.course.reached.finish = lambda result: finish(flag_overloaded(result, sensor.spec.force_range_n[1]))
     with threadpool_limits(limits=threads):
@@ -126,7 +126,7 @@ def _by_motion(sensor, task, press, *, threads=1):
 
 
 def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callable[[PressResult], PressResult]]:
-    """The object in its pose over the sensor, and what is done to each result: flags, and the object where that is kept."""
+    """The object in its pose over the sensor, and a function that completes each result: flags, and the object if it is kept."""
     placed = place(task.pressed, pose=task.pose)      # type: ignore[arg-type]
     check_over_sensor(placed, sensor.spec.footprint_mm)
     touch = HeightField(placed).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
@@ -142,7 +142,7 @@ def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callabl
 
 
 def layers_at_rest(sensor: "Sensor") -> SurfaceMotion:
-    """The surface of layers that nothing presses."""
+    """The surface of layers at rest."""
     return layered_surface(sensor.spec, np.zeros((1, *sensor.spec.map_shape)))
 
 
@@ -159,7 +159,7 @@ def _load_solid(spec, laws):
 
 
 def solid_at_rest(sensor: "Sensor") -> SurfaceMotion:
-    """The surface of a solid that nothing presses."""
+    """The surface of a solid at rest."""
     return surface_of(sensor, [np.zeros_like(sensor.elements.points)])      # type: ignore[union-attr]
 
 

@@ -1,4 +1,4 @@
-"""Maps of one object at rising forces, from which a press at any force between them is taken."""
+"""Maps of one object at rising forces, for interpolation to any force between them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,9 +15,9 @@ class Ladder:
     maps_mm: np.ndarray
 
     def weights(self, force_n: np.ndarray) -> np.ndarray:
-        """Weights (n, l) of the maps at forces (n,) from 0 to the highest, beyond which that one stays.
+        """Weights (n, l) of the maps at forces (n,) from 0 to the highest; larger forces take the last map.
 
-        A cubic spline over the root of the force, in which a ball's and a flat punch's depth are both nearly straight.
+        A cubic spline over the square root of the force, in which the depths of a ball and a flat punch are both nearly linear.
         """
         return self._spline(np.sqrt(np.minimum(force_n, self.force_n[-1])))[:, 1:]
 

@@ -1,4 +1,4 @@
-"""How presses on layers make a `PressResult`: maps, readings, and which load steps can be relied on.
+"""Construction of a `PressResult` from a press on layers: maps, readings, and validity of the load steps.
 
 The rules of `PressResult.within_validity`: docs/reference/command_line.md, "What is flagged".
 """
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
     from softtact.sensors.specification import AnySpec
 
-_HARDLY = 1e-6     # of a force: a share of the shell that is not worth a warning
-_DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
-_HARDLY_COMPRESSED = 0.33   # of a frustum's height; the foundation model then errs by 2 % at most (docs/explanation/fast_models.md)
+_HARDLY = 1e-6     # of a force: largest share on the shell without a warning
+_DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not stiffen towards its base
+_HARDLY_COMPRESSED = 0.33   # of a frustum's height: the foundation model's error is at most 2 % (docs/explanation/fast_models.md)
 _OVERLAP_LEFT = 3.0         # times the allowed overlap, or gap under pressure: above, the augmentations have failed
-_FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
+_FEWEST_POINTS = 9          # contact points under pressure: fewer do not resolve the contact of a spike
 
 
 def shell_of(sensor: "Sensor") -> Shell:
@@ -57,7 +57,7 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
 
 def layered_surface(spec: "AnySpec", thinning_mm: np.ndarray, displacement_mm: np.ndarray | None = None,
                     pressure: list[Samples] | None = None) -> SurfaceMotion:
-    """What the surface of layers did, by their thinning (l, ny, nx) in mm and the displacement (l, ny, nx, 3) of the map's
+    """The `SurfaceMotion` of layers, from their thinning (l, ny, nx) in mm and the displacement (l, ny, nx, 3) of the map's
     plane."""
     if displacement_mm is None:
         displacement_mm = -thinning_mm[..., None] * [np.nan, np.nan, 1.0]
@@ -85,7 +85,7 @@ def _on_map(spec: "AnySpec", fields: np.ndarray) -> list[Samples]:
 
 
 def _calibration(spec):
-    """Attribute that states what a calibrated sensor's readings rest on."""
+    """Attribute that states the calibration of a sensor's readings."""
     return {} if spec.calibration is None else {"calibration": spec.calibration.source}
 
 
@@ -110,21 +110,21 @@ def _friction(spec, model):
 
 
 def valid_elastic(depth_mm: np.ndarray, *, thickness_mm: float) -> np.ndarray:
-    """Which load steps (l,) of an elastic press hold: depth_mm (l,) is how far the object's lowest point has come down."""
+    """Which load steps (l,) of an elastic press are valid; depth_mm (l,): descent of the object's lowest point."""
     return depth_mm < _DEEPEST_LINEAR * thickness_mm
 
 
 def valid_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustum_mm: float, thickness_mm: float,
                      law_limit_mm: float) -> np.ndarray:
-    """Which load steps (l,) of a foundation press hold, by its most compressed frustum (l,), frustum_mm high, and by how far the
-    object's lowest point has come down (l,): the slab is linear, too, and a corner sinks into it without end.
+    """Which load steps (l,) of a foundation press are valid, by the most compressed frustum (l,), frustum_mm high, and by the
+    descent (l,) of the object's lowest point, as the slab is linear too and does not limit the depth of a corner.
     """
     return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
 def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarray, points: np.ndarray, depth_mm: np.ndarray,
                        rough: np.ndarray, forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> np.ndarray:
-    """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts, balance and growth of depth.
+    """Which load steps (l,) of a hyperelastic press are valid, by compression, contact error, residual and growth of depth.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
     points (l,): of the cover that carry the object;  compression_mm, frustum_mm: nan without frusta, where nothing asks for them
@@ -135,19 +135,19 @@ def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarr
 
 
 def _grows(depth, *, slack_mm):
-    """Which of the depths (l,) are not above a later one, nor below an earlier one: of two such one is another equilibrium."""
+    """Which depths (l,) increase with the load steps: of two that do not, one belongs to another branch of equilibria."""
     deepest_before, least_after = np.maximum.accumulate(depth), np.minimum.accumulate(depth[::-1])[::-1]
     return (depth >= deepest_before - slack_mm) & (depth <= least_after + slack_mm)
 
 
 def flag_buried(result: PressResult, top_mm: float) -> PressResult:
-    """The result with the load steps flagged at which the object's top has sunk below the surface at rest: no model feels that
-    side.
+    """The result with the load steps flagged at which the object's top is below the surface at rest: no model has contact on
+    that side.
     """
     above = result.indentation_mm < top_mm
     return replace(result, within_validity=result.within_validity & above.astype(np.int8))
 
 
 def flag_overloaded(result: PressResult, largest_n: float) -> PressResult:
-    """The result with the steps flagged at which a press by depth needs more force than the sensor bears."""
+    """The result with the steps flagged at which a press by depth needs more force than the sensor's limit."""
     return replace(result, within_validity=result.within_validity & (result.normal_force_n <= largest_n).astype(np.int8))

@@ -1,4 +1,4 @@
-"""Many presses at once: over processes, one a core, on what the sensor prepared once; or as one batch on a GPU."""
+"""Many presses at once: in parallel processes that share the sensor's prepared models, or as one batch on a GPU."""
 
 import multiprocessing
 import time
@@ -35,7 +35,7 @@ _PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": 
 
 @dataclass(frozen=True)
 class Batch:
-    """How many presses go about their work."""
+    """Settings of many presses."""
 
     force_n: np.ndarray
     """(l,) in N: of each press."""
@@ -83,7 +83,7 @@ def _pressed_all(sensor, jobs, batch):
 
 
 def on_gpu(device: str, model: str) -> bool:
-    """Whether presses of a model go to a GPU as one batch: where one is asked for, or is there; only the elastic model's can."""
+    """Whether presses of a model run as one batch on a GPU, if one is requested or available; only the elastic model can."""
     if device == "cpu" or (device == "auto" and model != "elastic"):
         return False
     if model != "elastic":
@@ -118,9 +118,9 @@ class _Underside:
     height: np.ndarray
     """(n,) in mm: over the grid's nodes."""
     touch_mm: float
-    """How far it comes down until it touches."""
+    """Descent to first touch."""
     stop_mm: float
-    """How far it comes down until it rests on the shell."""
+    """Descent until it rests on the shell."""
     top_mm: float
     """Height of its top over first touch."""
 
@@ -172,7 +172,7 @@ def _in_process(act, job):
 
 
 def _pressed(sensor, job, *, force_n, model, options):
-    """A result, or the error in its place: one press that fails does not lose the others."""
+    """A result, or the error in its place, so that a press that fails does not affect the others."""
     mesh, pose = job
     try:
         return sensor.press(mesh, pose=pose, force_n=force_n, model=model, threads=1, label="", **options)

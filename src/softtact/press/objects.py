@@ -1,5 +1,5 @@
-"""What is pressed: soft objects, which bend as the sensor does, rigid ones as they are placed, and where an object first
-touches."""
+"""Pressed objects: soft objects, which deform like the sensor, rigid ones with their positions, and the first touch of
+an object."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _OF_TURN = {"object_turn": ("turn", ("step", "axis", "axis_at_rest"), "1"), "obj
 
 @dataclass(frozen=True)
 class SoftObject:
-    """A soft object: what bends as the sensor does.
+    """A soft object, which deforms like the sensor.
 
     mesh: in mm, of one region;  law: its hyperelastic law;  held_share: share of its height, from the top, that a rigid holder
     carries;  friction: Coulomb's coefficient against the sensing surface
@@ -122,9 +122,9 @@ class PlacedObject:
 
 
 def placed_object(placed: trimesh.Trimesh, *, touch_mm: float, indentation_mm: np.ndarray, aside_mm: np.ndarray) -> PlacedObject:
-    """The `PlacedObject` of a mesh in its pose, of the depths (step,) from first touch and the displacements (step, 2) aside.
+    """The `PlacedObject` of a mesh in its pose, from depths (step,) below first touch and displacements (step, 2) along x, y.
 
-    touch_mm: how far it comes down from its pose until it touches
+    touch_mm: descent from the pose to first touch
     """
     down = -(touch_mm + np.asarray(indentation_mm))
     return PlacedObject(points_mm=np.asarray(placed.vertices, dtype=float), triangles=np.asarray(placed.faces, dtype=np.int64),
@@ -144,9 +144,9 @@ def first_direction(motion: Motion) -> np.ndarray:
 
 
 def way_to_touch(coming: np.ndarray, surface: np.ndarray, direction: np.ndarray) -> float:
-    """Way (mm) along a unit vector (3,) after which triangles (t, 3, 3) first touch those of a surface (u, 3, 3), all in mm.
+    """Displacement (mm) along a unit vector (3,) until triangles (t, 3, 3) first touch those of a surface (u, 3, 3), all in mm.
 
-    Facets are seen counter-clockwise from outside. It is negative where they overlap already; inf where they miss each other.
+    Facets are counter-clockwise from outside. It is negative if they overlap already, and inf if they miss each other.
     """
     turned = _turn_down(direction)
     coming, surface = coming @ turned.T, surface @ turned.T

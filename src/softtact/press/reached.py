@@ -1,4 +1,4 @@
-"""What a press has reached: kept in this one place, for `on_step`, and for the error or the interruption that ends it early."""
+"""The completed load steps of a press, for `on_step`, and for an error or an interruption that ends the press early."""
 
 import time
 import warnings
@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 
 
 class Reached:
-    """The load steps of a press that are reached, the seconds that each took, and what makes a `PressResult` of them.
+    """The completed load steps of a press, their times in s, and the functions that make a `PressResult` of them.
 
-    on_step: called with the result so far at each step that is reached but the last
+    on_step: called with the partial result after each completed step except the last
     """
 
     def __init__(self, on_step: "Callable[[PressResult], None] | None" = None) -> None:
         self.on_step = on_step
         self.times: list[float] = []
         self.finish: Callable[[PressResult], PressResult] = lambda result: result
-        """What is done to any result of the press: flags, and the object where it is."""
+        """Completes each result of the press: flags, and the placed object."""
         self._so_far: Callable[[], PressResult] | None = None
 
     def follow(self, load_steps: Iterable[Any], count: int, so_far: "Callable[[], PressResult]", *, label: str = "",
                start: float | None = None) -> None:
-        """Go through `count` load steps, and note the seconds of each; the solver's preparation counts to the first.
+        """Iterate over `count` load steps and record the time of each; the solver's preparation counts to the first.
 
-        so_far: makes the result of the steps whose times are noted: an interruption may come just before one is
-        label: of the progress on stderr;  start: when the preparation began, by `time.perf_counter`
+        so_far: makes the result of the steps whose times are recorded: an interruption may come just before that
+        label: of the progress on stderr;  start: of the preparation, by `time.perf_counter`
         """
         self.times.clear()
         self._so_far = so_far
@@ -46,17 +46,17 @@ class Reached:
                     self.on_step(self.finish(so_far()))
 
     def keep(self, times: list[float], so_far: "Callable[[], PressResult]") -> None:
-        """Keep steps that a model went through by itself."""
+        """Record the times of steps that a model iterated over itself."""
         self.times, self._so_far = times, so_far
 
     def result(self) -> "PressResult | None":
-        """The result of the steps that are reached; None where there is none."""
+        """The result of the completed steps; None without any."""
         return self.finish(self._so_far()) if self._so_far is not None and self.times else None
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """While this lasts, a ConvergenceError, of which a time limit is one, and a KeyboardInterrupt take with them as their
-        `result` what is reached; None where that is nothing.
+        """A context in which a ConvergenceError, including a time limit, and a KeyboardInterrupt get the result of the completed
+        steps as their `result`; None without any.
         """
         try:
             yield

@@ -83,7 +83,7 @@ class PressResult:
     y_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "y", coordinate="y") | _PLANE)
     """(y,) in mm: the map's rows in the sensor frame."""
     model: str = field(metadata=_FACT)
-    """Which model pressed: elastic, foundation, hyperelastic or solid."""
+    """The model of the press: elastic, foundation, hyperelastic or solid."""
     sensor: str = field(metadata=_FACT)
     """The sensor's name."""
     solver: str = field(metadata=_FACT)
@@ -107,7 +107,7 @@ class PressResult:
     """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, of a fast model on frusta and
     where the model was chosen by it; else nan. How well it is known: docs/explanation/fast_models.md."""
     selection_reason: str = field(default="", metadata=_FACT)
-    """What made the choice of the model, where it was not the user's."""
+    """The reason for the choice of the model, if the user did not name it."""
     largest_counts: float = field(default=2400.0, metadata=_FACT)
     """Counts at which the sensor's readout ends."""
     attributes: dict[str, Any] = field(default_factory=dict)
@@ -267,7 +267,7 @@ def _dataset_of(result: PressResult) -> "xarray.Dataset":
     data = xarray.Dataset(variables, coords=coordinates, attrs=attributes)
     for name, reading in result.readings.items():
         if not (name == _TAXELS and "tactile_map" in variables):
-            data = data.merge({f"reading_{name}": _told_apart(name, reading)})
+            data = data.merge({f"reading_{name}": _with_separate_dimensions(name, reading)})
     return data
 
 
@@ -275,7 +275,7 @@ def _is_tactile_map(result):
     return _TAXELS in result.readings and result.readings[_TAXELS].dims == _DIMENSIONS_OF_TAXELS
 
 
-def _told_apart(name, reading):
+def _with_separate_dimensions(name, reading):
     """A reading whose dimensions, but for `step`, and coordinates have names that no other has."""
     names = {one: f"{one}_of_{name}" for one in (*reading.dims, *reading.coords) if one != "step"}
     return reading.rename(names).assign_attrs(reading=name)
@@ -373,7 +373,7 @@ def _renewed(path, data):
     if len(points["reading_points_mm"]):
         values = np.concatenate([points["reading_pressure_mpa"][..., None], points["reading_displacement_mm"]], axis=2)
         reading = labelled_points(values, points["reading_points_mm"])
-        renewed = renewed.merge({"reading_points": _told_apart("points", reading)}, combine_attrs="override")
+        renewed = renewed.merge({"reading_points": _with_separate_dimensions("points", reading)}, combine_attrs="override")
     return renewed
 
 

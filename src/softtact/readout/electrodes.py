@@ -1,4 +1,4 @@
-"""The electrodes on the PCB: means over them, the field at their edges, what neighbours take from each other."""
+"""The electrodes on the PCB: means over them, the fringe field at their edges, and crosstalk of neighbours."""
 
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -54,7 +54,7 @@ def electrode_sides(spec: "BaseSpec", *, spacing_mm: float = 0.0) -> tuple[float
 
 
 def edge_excess(side_mm: float, gap_mm: np.ndarray) -> np.ndarray:
-    """What the field at two opposite edges adds to a plate's capacitance, as a share of it; side and gap in mm, any shape.
+    """Relative increase of a plate's capacitance by the fringe field at two opposite edges; side and gap in mm, any shape.
 
     gap / (pi side) (1 + ln(2 pi side / gap)): a strip of two equal plates, side > gap; H. B. Palmer, Trans. AIEE 56 (1937) 363-366
     """
@@ -84,7 +84,7 @@ def _edge_share(count, outer, inner):
 def coupled(values: np.ndarray, share: float) -> np.ndarray:
     """Values (..., rows, columns) after each pair of neighbours in a row or column exchanged `share` of their difference.
 
-    Nothing is lost: the sum stays, a uniform map stays, and what i takes from j is what j takes from i.
+    The sum and a uniform map are preserved, and the coupling is symmetric.
     """
     out = np.array(values, dtype=float)
     for axis in (-1, -2):

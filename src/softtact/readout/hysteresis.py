@@ -5,9 +5,9 @@ press' own map u_e(F) is the deformation after a long time under F, and what is 
 
     u(t) = integral of J(t - s) du_e/ds ds,   J(t) = 1 - sum_i g_i exp(-t / tau_i),
 
-J from 1 - sum g_i at once to 1 in the end. A step of force is followed by creep: u rises. (Held at a deformation, the force would
-relax; that is the same material seen from the other side, with other shares and shorter times.)
-Each term keeps the part q_i that has not yet arrived. Where u_e is linear in time its update is exact (Simo and Hughes,
+where J grows from 1 - sum g_i to 1. After a step of force u creeps upwards. (At a constant deformation the force would relax;
+the same material then has other shares and shorter time constants.)
+Each term stores the delayed part q_i. For u_e linear in time its update is exact (Simo and Hughes,
 Computational Inelasticity, 1998, sec. 10.3; Taylor, Pister and Goudreau, 1970):
 
     q_i(t + dt) = exp(-dt / tau_i) q_i(t) + g_i (u_e(t + dt) - u_e(t)) (1 - exp(-dt / tau_i)) tau_i / dt.
@@ -53,7 +53,7 @@ def staircase(force_n: np.ndarray, *, rate_n_per_s: float, hold_s: float, cycles
 
 
 def lagged(values: np.ndarray, times_s: np.ndarray, *, shares: Sequence[float], time_constants_s: Sequence[float]) -> np.ndarray:
-    """What is felt (n, ...) at `times_s` (n,) of elastic values (n, ...), linear between; at the first all has arrived.
+    """Delayed values (n, ...) at `times_s` (n,) of elastic values (n, ...), linear between; at the first one in equilibrium.
 
     shares, time_constants_s (terms,): g_i and tau_i in s; without terms the values themselves
     """
@@ -75,7 +75,7 @@ def _not_yet_arrived(values, steps, share):
 
 def felt_branches(maps: np.ndarray, history: LoadHistory, *, shares: Sequence[float],
                   time_constants_s: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Maps (load steps, ...) felt on the way up and on the way down, for elastic maps (load steps, ...) of the same load steps."""
+    """Delayed maps (load steps, ...) during loading and unloading, from elastic maps (load steps, ...) of the same load steps."""
     elastic = np.concatenate([np.zeros((1, *maps.shape[1:])), maps])[history.load_step]
     felt = lagged(elastic, history.times_s, shares=shares, time_constants_s=time_constants_s)
     return felt[history.loading], felt[history.unloading]

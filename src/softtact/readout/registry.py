@@ -1,4 +1,4 @@
-"""Readouts: what a sensor tells of what its surface did. One file each, registered by its kind.
+"""Readouts: a sensor's measurements of its surface's motion. One file each, registered by its kind.
 
     @register("mean_depth")
     @dataclass(frozen=True)
@@ -9,7 +9,7 @@
             return labelled(self.scale * surface.thinning_mm.mean(axis=(1, 2)), ("step",), units="mm")
 
 A sensor's `readouts:` name them: {depth: {kind: mean_depth, scale: 2}}; `PressResult.readings["depth"]` is what it reads, and files
-hold it. A readout of one's own registers wherever it is imported before the sensor is loaded. A class of pydantic's, or a
+hold it. A user's readout is registered when its module is imported before the sensor is loaded. A class of pydantic's, or a
 dataclass, checks its fields; `read` raises InputError for what does not fit the sensor: it is tried at rest when the sensor is
 loaded.
 """
@@ -46,7 +46,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class SurfaceMotion:
-    """What a sensing surface did in a press: all that a readout can read, at each of its load steps."""
+    """The motion of a sensing surface in a press: the input of readouts at each load step."""
 
     spec: Specification
     """The sensor's."""
@@ -65,7 +65,7 @@ class SurfaceMotion:
 
 
 class Readout(Protocol):
-    """What a sensor tells of what its surface did."""
+    """A measurement of the motion of a sensor's surface."""
 
     def read(self, surface: SurfaceMotion) -> "xarray.DataArray":
         """Labelled readings, `step` their first dimension, with their `units` as an attribute or as a coordinate."""
