@@ -5,8 +5,8 @@ tridiagonal (A. George, J. W. Liu, Computer Solution of Large Sparse Positive De
 
     L_i L_i^T = D_i - C_(i-1)^T C_(i-1),    C_i = L_i^-1 A_(i,i+1)
 
-Unknowns that couple to the next layer come last in their own, so that C_i has rows for them alone. It serves long bodies, whose
-layers hold some thousand unknowns, and many right-hand sides: all of it is matrix products.
+Unknowns that couple to the next layer are the last ones of their layer, so that C_i has rows for these alone. The method suits long
+bodies, whose layers have about a thousand unknowns, and many right-hand sides: it consists of matrix products.
 """
 
 import numpy as np
@@ -45,7 +45,7 @@ class BlockTridiagonalSolver:
         return out.reshape(right.shape)
 
     def close(self) -> None:
-        """Forget the factors."""
+        """Free the factors."""
         self._factors = []
 
 
@@ -69,7 +69,7 @@ class _Blocks:
         return slice(stop - self._tails[number], stop)
 
     def factors(self):
-        """(L_i, C_i) of the layers in turn, C_i by its rows that are not zero, None of the last; ends where it is not definite."""
+        """(L_i, C_i) of the layers in turn, C_i by its nonzero rows, None for the last; stops at an indefinite block."""
         update = 0.0
         for number, own in enumerate(self.parts):
             factor, fault = sla.lapack.dpotrf(np.asfortranarray(self._ordered[own, own].toarray() - update), lower=1, overwrite_a=1)

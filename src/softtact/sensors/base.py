@@ -48,16 +48,16 @@ class Specification(FiniteSection):
         return []
 
     def need_layers(self) -> None:
-        """Refuse what takes sensors of layers alone, where the sensor is none."""
+        """Raise InputError if the sensor does not consist of layers."""
 
     def need_frusta(self, what: str, remedy: str) -> None:
         """Refuse `what` with one sentence that ends in the remedy, where the sensor has no frusta."""
 
     def _found_in(self, folder: Path) -> None:
-        """Take the folder of the sensor's file, where its paths are relative to that."""
+        """Store the folder of the sensor's file, to which its paths are relative."""
 
     def _check(self, where: str) -> None:
-        """Refuse values that are right each by itself and wrong together."""
+        """Refuse values that are valid one by one but not together."""
         low, high = self.force_range_n
         if low < 0 or low >= high:
             raise InputError(f"{where}, at 'force_range_n': {[low, high]} is no range; write [least, largest] in N.")
@@ -122,7 +122,7 @@ class BaseSpec(Specification):
 
     @property
     def deepest_mm(self) -> float:
-        """How far (mm) an object can come down at most: to the board, or without end where there is none."""
+        """Largest descent (mm) of an object: to the board, or infinite without one."""
         return self.thickness_mm if self.base_held else np.inf
 
     @property
@@ -137,7 +137,7 @@ class BaseSpec(Specification):
 
     @property
     def parts_in_words(self) -> str:
-        """What the sensor is made of, in some words."""
+        """Short description of the sensor's parts."""
         raise NotImplementedError
 
     @property
@@ -163,7 +163,7 @@ class BaseSpec(Specification):
                 f"maps of {self.map_shape[0]} x {self.map_shape[1]} points")
 
     def check_for(self, kind: str) -> None:
-        """Refuse what a model of this kind (elastic, foundation, hyperelastic) cannot take: no frusta, or no middle row."""
+        """Raise InputError if a model (elastic, foundation, hyperelastic) cannot press it: no frusta, or no middle row."""
         if kind == "foundation":
             self.need_frusta("the foundation model", "press with elastic or hyperelastic")
         if kind in ("elastic", "foundation") and not all(count % 2 for count in self.map_shape):
