@@ -79,18 +79,18 @@ class GraspStudy:
     """A checked configuration with what it grasps."""
 
     values: GraspValues
+    """The configuration."""
     spec: AnySpec
+    """The sensor on both fingers."""
     items: list[GraspItem]
+    """The objects in their positions, in the order of the configuration."""
     catalogue: dict[str, CatalogueEntry]
+    """By name, all objects that can be grasped."""
 
     @property
     def name(self) -> str:
         """The study's name, and its folder below results/."""
         return self.values.study
-
-    def entry_of(self, name: str) -> CatalogueEntry:
-        """An object's line in the catalogue."""
-        return self.catalogue[name]
 
 
 def read_values(path: str | Path) -> dict[str, Any]:

@@ -35,22 +35,22 @@ _LISTED = 8     # items without a recording that a refusal names
 
 @dataclass(frozen=True)
 class Study:
-    """A checked configuration with the files that it names.
-
-    values: the configuration;  spec: the sensor
-    materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
-    section_item: what figure 2 presses
-    archive: the published files that maps and readings come from, or None where items are pressed
-    recordings: {SET/ITEM: recordings that its readings come from}, or None
-    """
+    """A checked configuration with the files that it names."""
 
     values: Values
+    """The configuration."""
     spec: SensorSpec
+    """The sensor."""
     materials: dict
+    """{name: MaterialConfig}."""
     items_of: dict
+    """{set: {id: Item}} in the order of the configuration."""
     section_item: Item
+    """What figure 2 presses."""
     archive: Archive | None = None
+    """The published files that maps and readings come from, or None where items are pressed."""
     recordings: dict[str, list[Recording]] | None = None
+    """{SET/ITEM: recordings that its readings come from}, or None."""
 
     @property
     def virtual(self) -> bool:

@@ -16,16 +16,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Item:
-    """One object in one pose: what a press presses. `id` names it in paths; `first` is its object's first pose."""
+    """One object in one pose: what a press presses."""
 
     id: str
+    """Its name in paths."""
     set: str
+    """indenters, unseen or grasps."""
     object: str
+    """The object's name in the catalogue."""
     file: str
+    """Its mesh."""
     unit: str
+    """Of the mesh."""
     label: str
+    """Its name for readers."""
     pose: list[float] | None
+    """Six values as of `Pose.from_values`; None centres it over the sensor."""
     first: bool
+    """Whether this is the object's first pose."""
 
 
 def read_catalogue(path: Path) -> dict[str, CatalogueEntry]:
