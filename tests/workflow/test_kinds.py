@@ -57,7 +57,9 @@ def after(jobs, changed):
     return stages
 
 
-@pytest.fixture(scope="module", params=CASES, ids=lambda case: case.kind)
+# One kind runs with the fast tests: the others go through the same list of jobs and the same rules.
+@pytest.fixture(scope="module", params=[pytest.param(case, id=case.kind, marks=() if case.kind == "grasps" else pytest.mark.slow)
+                                        for case in CASES])
 def case(request):
     module = KINDS[request.param.kind].jobs.partition(":")[0]
     if importlib.util.find_spec(module) is None:

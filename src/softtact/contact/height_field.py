@@ -93,12 +93,6 @@ class MovedSurface:
     offset_mm: np.ndarray
     """The displacement (2,)."""
 
-    def on_grid(self, x_mm: np.ndarray, y_mm: np.ndarray) -> np.ndarray:
-        """Heights (y, x) over the grid of points x_mm (x,), y_mm (y,); nan beside the object."""
-        x, y = np.meshgrid(x_mm, y_mm)
-        heights = np.asarray(self(x.ravel(), y.ravel())[0], dtype=float).reshape(x.shape)
-        return np.where(heights < NO_CONTACT_MM, heights, np.nan)
-
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
         return self.surface(x - self.offset_mm[0], y - self.offset_mm[1])
@@ -112,12 +106,6 @@ class SweptSurface:
     """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
     offsets_mm: np.ndarray
     """The displacements (k, 2) from its first place."""
-
-    def on_grid(self, x_mm: np.ndarray, y_mm: np.ndarray) -> np.ndarray:
-        """Heights (y, x) over the grid of points x_mm (x,), y_mm (y,); nan beside the object."""
-        x, y = np.meshgrid(x_mm, y_mm)
-        heights = np.asarray(self(x.ravel(), y.ravel())[0], dtype=float).reshape(x.shape)
-        return np.where(heights < NO_CONTACT_MM, heights, np.nan)
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""

@@ -24,6 +24,7 @@ from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
+from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.result import gathered
 from softtact.press.making import flag_buried, flag_overloaded, layered_surface
@@ -46,6 +47,12 @@ _REACH = 2.0          # times the length of a facet: how far apart surfaces may 
 # --- sensors of layers ---
 
 
+_SMOOTH = SolidSettings()
+# Points of a rubber that rest on an edge between two facets of a rigid mesh change from one to the other in turns, which leaves up
+# to 1e-5 of the load unbalanced (a ball on coro, 0.5 mm deep), far below what the mesh leaves.
+_ON_FACETS = SolidSettings(relative_residual=2e-5)
+
+
 def press_pad(sensor: "Sensor", task: PressTask) -> PressResult:
     """Press a soft or a rigid object on layers through a motion; its steps by force load the object, or its holder.
 
@@ -62,7 +69,7 @@ def press_pad(sensor: "Sensor", task: PressTask) -> PressResult:
         body = pad.with_rigid(rigid, threads=course.threads)
         course.reached.finish = partial(_finished, sensor, rigid, task)
     gather = partial(_on_pad, pad, body, None if task.soft or not course.keep_object else rigid, course)
-    return course.reached.finish(run(body, OBJECT, task.motion, gather, course))
+    return course.reached.finish(run(body, OBJECT, task.motion, gather, course, _SMOOTH if task.soft else _ON_FACETS))
 
 
 def _finished(sensor, rigid, task, result):
@@ -242,7 +249,7 @@ def solid_result(path: SolidPath) -> PressResult:
 
 
 def run(body: SolidBody, frame: str, motion: Motion, gather: Callable[[list[SolidLoadStep]], PressResult],
-        course: Course) -> PressResult:
+        course: Course, settings: SolidSettings = _SMOOTH) -> PressResult:
     """What `gather` makes of the load steps of a body whose one frame is moved."""
     def say(text: str) -> None:
         if course.label:
@@ -251,7 +258,7 @@ def run(body: SolidBody, frame: str, motion: Motion, gather: Callable[[list[Soli
     count, steps, reached = len(motion.steps), list[SolidLoadStep](), course.reached
 
     def announced() -> Iterator[None]:
-        for step in SolidPath(body, {frame: motion}, tell=say).run():
+        for step in SolidPath(body, {frame: motion}, settings=settings, tell=say).run():
             steps.append(step)
             force = float(np.linalg.norm(step.loads[0, :3]))
             say(f"step {len(steps)} of {count}, {force:.4g} N, {step.iterations} iterations, {step.wall_time_s:.0f} s")
