@@ -317,7 +317,7 @@ def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_pat
 
 def test_a_materials_yaml_is_given_alone(refused, tmp_path):
     status, said = refused("fit", material_file("neoprene"), "--mode", "uniaxial", "--out", tmp_path / "card.json")
-    assert status == 1 and "names its own files and options; give it without others" in said
+    assert status == 1 and "names its files and options; give it without others" in said
 
 
 def test_press_refuses_a_card_that_it_cannot_use(refused):

@@ -106,7 +106,7 @@ def test_a_video_that_was_cut_off_is_refused_and_not_read_up_to_there(name, code
                  id="bands"),
     pytest.param(np.dstack([TINY[0]] * 3), {"photometric": "ycbcr"}, "its values mean YCBCR", id="YCbCr"),
     pytest.param(np.tile(TINY[:, :16, :16], (4, 1, 1))[:16], {"volumetric": True, "tile": (16, 16, 16)},
-                 "in a way that is not known", id="volume"),
+                 "in an unknown layout", id="volume"),
 ])
 def test_a_tiff_whose_values_are_no_light_is_refused(values, how, said, tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", values, **how)

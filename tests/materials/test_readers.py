@@ -111,7 +111,7 @@ def test_a_missing_file_is_refused(tmp_path):
 def test_a_mode_for_all_files_that_changes_nothing_is_refused_and_one_that_does_is_not(write_file, published):
     path = write_file(PLAIN, "planar.csv")
     assert read_curves([path], mode="uniaxial")[0].mode == "uniaxial"
-    with pytest.raises(InputError, match="the mode uniaxial for all files has no effect, for each states its own"):
+    with pytest.raises(InputError, match="the mode uniaxial for all files has no effect, for each states one"):
         read_curves([f"equibiaxial={path}"], mode="uniaxial")
     with pytest.raises(InputError, match="has no effect"):
         read_curves(published / "literature" / "Treloar_1944", layout="literature", mode="uniaxial")

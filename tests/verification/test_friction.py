@@ -78,7 +78,7 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     monkeypatch.setattr(newton_step, "_INNER_STEPS", 1)
     monkeypatch.setattr(newton_step, "_FORCING", 1e-9)
     monkeypatch.setattr(newton_step, "_INNER_TOLERANCE", 1e-9)
-    monkeypatch.setattr(newton_step._Problem, "best_share", lambda *_: 1.0)
+    monkeypatch.setattr(newton_step._StepProblem, "best_share", lambda *_: 1.0)
     monkeypatch.setattr(unit_cells, "_FARTHEST_MM", np.inf)        # nor damps or cuts the steps of single cells
     monkeypatch.setattr(unit_cells, "_FARTHEST_OUTER_MM", np.inf)
     body, h = body_with(board=0.3, on_object=0.3), 1e-6

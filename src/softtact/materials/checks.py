@@ -84,7 +84,7 @@ def _swapped(raw, mode):
     y, x = raw
     plausible = mode != VOLUMETRIC and (x > 0.05).all() and np.abs(x - 1).min() < 0.3 and (
         (y * np.sign(x - 1)) >= -SIGN_TOLERANCE * np.abs(y).max()).all()
-    return " (swapped, the columns would make sense; are they?)" if plausible else ""
+    return " (swapped, the columns would make sense: are they swapped?)" if plausible else ""
 
 
 def _check_magnitude(path, rows, x, y, mode, raw):

@@ -253,7 +253,7 @@ def _in_order(path, names, numbers, outliers):
     """The columns of values by the numbers in their names; another order in the file is reported."""
     order = _numbers_of([names[k] for k in numbers])
     if order is None:
-        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not order the columns; "
+        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not tell the order of the columns; "
                          "name them with one word and numbers without a gap, such as tax1 to tax28 or x0 to x32.")
     ordered = [numbers[k] for k in sorted(range(len(numbers)), key=lambda k: order[k])]
     if ordered != numbers:

@@ -151,7 +151,7 @@ def test_lifted_off_the_object_leaves_no_force_and_touches_again(surface):
     assert found.force_n[3, 2] < -0.1
 
 
-REFUSED = {"a rotation": (Motion().step(ways={"rz": 5.0}), "Step 1 .* the elastic model moves the object along x, y and z"),
+REFUSED = {"a rotation": (Motion().step(ways={"rz": 5.0}), "Step 1 .* the elastic model prescribes x, y and z and loads z only"),
            "a lateral load": (Motion().press(force_n=1).step(loads={"x": 1.0}), "Step 2 .* leave the load on x out"),
            "a pull": (Motion().step(loads={"z": 2.0}), "a load of 2 N along z does not press"),
            "nothing": (Motion(), "The motion has no steps")}
