@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from support.frustum_laws import made_up
+from support.meshed_frusta import punch_surface
 
 import softtact
 from softtact.contact.motion import Motion
@@ -14,7 +15,9 @@ from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.models.solid.frusta import FrustumItem
 from softtact.models.solid.path import SolidPath
+from softtact.press import solid_pad
 from softtact.press.solid_pad import OBJECT, SolidPad
+from softtact.sensors.fields import Edge
 
 
 @pytest.mark.parametrize("side", [4.0, 30.0], ids=["narrow", "wide"])
@@ -37,27 +40,31 @@ def test_an_object_beside_the_sensor_is_refused():
         SolidPad(sensor).with_rigid(far, threads=1)
 
 
-def ball(radius=5.0):
-    return trimesh.creation.icosphere(subdivisions=4, radius=radius)
+def small_sensor():
+    """3 x 3 frusta of coro with free sides, on frusta of a law that needs no unit cell."""
+    coro = softtact.load_sensor("coro")
+    spec = coro.spec.model_copy(update={"footprint_mm": (3.6, 3.6), "edge": Edge(held="free"), "map_shape": (7, 7)})
+    return replace(coro, spec=spec, prepared_models={"frustum": made_up()})
 
 
-def steps_of(sensor, mesh, motion, *, friction, pose=None):
-    """The pad, the body and the load steps of a rigid mesh that is moved."""
+def steps_of(sensor, motion, *, friction):
+    """The pad, the body and the load steps of a round punch that is moved."""
     pad = SolidPad(sensor)
-    body = pad.with_rigid(place(mesh, pose=pose), friction=friction, threads=1)
+    body = pad.with_rigid(place(punch_surface()), friction=friction, threads=1)
     return pad, body, list(SolidPath(body, {OBJECT: motion}).run())
 
 
 @pytest.fixture(scope="module")
 def twisted():
-    """A ball of 5 mm, 0.2 mm deep in pad4x4 with mu = 0.2, twisted by 2 and by 30 more degrees."""
-    motion = Motion().step(ways={"z": -0.2}).step(ways={"rz": 2.0}).step(ways={"rz": 30.0})
-    return steps_of(softtact.load_sensor("pad4x4"), ball(), motion, friction=0.2)
+    """The punch 0.2 mm deep with mu = 0.2, twisted by 20 degrees in five steps."""
+    motion = Motion().step(ways={"z": -0.2})
+    for turn in (2.0, 2.0, 3.0, 5.0, 8.0):
+        motion = motion.step(ways={"rz": turn})
+    return steps_of(small_sensor(), motion, friction=0.2)
 
 
-@pytest.mark.slow
 def test_a_twist_that_slides_needs_the_torque_of_coulombs_law(twisted):
-    """Expected: the integral of mu p r over the contact. 15 degrees about its middle slide all but the innermost points."""
+    """Expected: the integral of mu p r over the contact, of which 20 degrees slide all but the innermost points."""
     _, body, steps = twisted
     history, contact = steps[-1].state.histories[0], steps[-1].state.contacts[0]
     places_mm = places(history.points, body.points + steps[-1].state.displacement)
@@ -67,26 +74,35 @@ def test_a_twist_that_slides_needs_the_torque_of_coulombs_law(twisted):
     assert 0 < steps[1].loads[0, 5] < 0.9 * expected
 
 
-@pytest.mark.slow
-def test_work_of_press_and_twist_is_stored_or_dissipated(twisted):
-    """The trapezoidal rule over the press leaves some percent; over the twist alone the balance is near."""
+def test_what_a_twist_works_is_stored_or_dissipated(twisted):
+    """Over the twist alone, from the pressed state on; the trapezoidal rule over five steps leaves some percent."""
     _, _, steps = twisted
-    work, stored = (np.array([getattr(step, name) for step in steps]) for name in ("work_mj", "dissipated_mj"))
-    energy = np.array([step.state.strain_energy for step in steps])
-    assert stored[-1] - stored[1] > 0.5 * (work[-1] - work[1])
-    assert work[-1] - work[0] == pytest.approx(energy[-1] - energy[0] + stored[-1] - stored[0], rel=0.05)
+    work, dissipated = (steps[-1].__dict__[name] - steps[0].__dict__[name] for name in ("work_mj", "dissipated_mj"))
+    stored = steps[-1].state.strain_energy - steps[0].state.strain_energy
+    assert dissipated > 0.5 * work > 0
+    assert stored + dissipated == pytest.approx(work, rel=0.1)
 
 
 @pytest.mark.slow
 def test_a_roll_to_the_other_side_is_the_mirror_image():
-    """Of a ball that is pressed and rolled about y by plus and minus 4 degrees: forces aside and torques change their sign."""
-    sensor, found = softtact.load_sensor("pad4x4"), []
+    """Pressed and rolled about y by plus and minus 3 degrees: forces aside and torques change their sign, the map its sides."""
+    sensor, found = small_sensor(), []
     for sign in (1, -1):
-        motion = Motion().step(ways={"z": -0.15}).step(ways={"ry": sign * 4.0})
-        pad, body, steps = steps_of(sensor, ball(), motion, friction=0.3)
+        motion = Motion().step(ways={"z": -0.2}).step(ways={"ry": sign * 3.0})
+        pad, body, steps = steps_of(sensor, motion, friction=0.3)
         found.append((steps[-1].loads[0], pad.result(body, steps).deformation_map_mm[-1]))
     (one, its_map), (other, other_map) = found
-    scale = np.abs(one).max()
-    np.testing.assert_allclose(one * [-1, 1, 1, 1, -1, -1], other, atol=2e-3 * scale)
-    np.testing.assert_allclose(its_map, other_map[:, ::-1], atol=2e-3 * its_map.max())
+    np.testing.assert_allclose(one * [-1, 1, 1, 1, -1, -1], other, atol=5e-3 * np.abs(one).max())
+    np.testing.assert_allclose(its_map, other_map[:, ::-1], atol=5e-3 * its_map.max())
     assert abs(one[0]) > 0.02 * abs(one[2])
+
+
+def test_layers_without_frusta_are_pressed_and_twisted_too(monkeypatch):
+    """pad4x4 with few elements: by 0.5 N, then 5 degrees; the force stays, and a torque about z comes up, less than mu F a."""
+    monkeypatch.setattr(solid_pad, "_CELL_OF_LAYERS", 5)
+    monkeypatch.setattr(solid_pad, "_MOST_PARTS", 1)
+    motion = Motion().press(force_n=0.5).step(ways={"rz": 5.0})
+    pad, body, steps = steps_of(softtact.load_sensor("pad4x4"), motion, friction=0.3)
+    result = pad.result(body, steps)
+    assert result.normal_force_n == pytest.approx([0.5, 0.5], rel=1e-4)
+    assert abs(result.torque_nmm[0, 2]) < 1e-3 < result.torque_nmm[1, 2] * -np.sign(steps[1].loads[0, 2]) < 0.3 * 0.5 * 1.5
