@@ -59,7 +59,7 @@ class Batch:
         policy = {name: given.pop(name) for name in ("policy", "tolerance_mm") if name in given}
         if given.get("failures", "raise") not in ("raise", "keep"):
             raise InputError(f"failures={given['failures']!r} is unknown; write 'raise' or 'keep'.")
-        return cls(force_n, model, given.pop("workers", None) or cores(), options=policy, **given)
+        return cls(force_n, model, given.pop("workers", None) or cores(), options=policy, **given)      # type: ignore[arg-type]
 
 
 def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh | SoftObject, Pose | None]], batch: Batch) -> list[PressResult]:

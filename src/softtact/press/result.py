@@ -131,7 +131,7 @@ class PressResult:
             defaults |= {"displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
                          "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan)}
         elif self.solid is not None:
-            defaults["displacement_mm"] = lambda: self.solid.displacement_mm      # type: ignore[union-attr]
+            defaults["displacement_mm"] = lambda: self.solid.displacement_mm
         for name, default in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default())

@@ -138,14 +138,14 @@ class Sensor:
         self.spec.check_for(model)
         if model not in self.prepared_models:
             self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
-                                 else cached_foundation(self.spec, self.laws, threads=threads))     # type: ignore[arg-type]
+                                 else cached_foundation(self.spec, self.laws, threads=threads))
         return self.prepared_models[model]
 
     def seconds_to_prepare_foundation(self) -> float:
         """About how long the foundation model's `prepared` takes; 0 where it is there."""
         if "foundation" in self.prepared_models:
             return 0.0
-        return seconds_to_prepare_foundation(self.spec, self.laws)     # type: ignore[arg-type]
+        return seconds_to_prepare_foundation(self.spec, self.laws)
 
     def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
         """The `LayeredBody` that the hyperelastic model presses on."""

@@ -149,14 +149,14 @@ def body_of(sensor: "Sensor", pressed: "trimesh.Trimesh | SoftObject", pose: Any
         points = _placed(sensor, pressed.mesh.points, pose)
         points = points + _to_touch(sensor, fine_triangles(pressed.mesh.boundary, points), direction)
         placed = pressed.with_faces(points, direction)
-        mesh = sensor.elements.joined(placed, prefix="object ")
+        mesh = sensor.elements.joined(placed, prefix="object ")      # type: ignore[union-attr]
         body = SolidBody(mesh, sensor.laws | {f"object {placed.regions[0]}": pressed.law}, **how,
                          carried={OBJECT: (_middle(points), ["object held"], "xyz")})
         body.add(_pair(sensor, body, Surface.of(mesh.face("object pressed")), soft=pressed))
         return body
     triangles = _placed(sensor, np.asarray(pressed.vertices), pose)[pressed.faces]
     triangles = triangles + _to_touch(sensor, triangles, direction)
-    body = SolidBody(sensor.elements, sensor.laws, **how, rigid={OBJECT: (_middle(triangles.reshape(-1, 3)), triangles)})
+    body = SolidBody(sensor.elements, sensor.laws, **how, rigid={OBJECT: (_middle(triangles.reshape(-1, 3)), triangles)})  # type: ignore[arg-type, dict-item]
     body.add(_pair(sensor, body, Surface.of({"triangle": body.surface_nodes(OBJECT)})))
     return body
 
@@ -172,13 +172,13 @@ def _placed(sensor: "Sensor", points: np.ndarray, pose: Pose | None) -> np.ndarr
     if pose is not None:
         return pose.apply(points)
     mesh = sensor.elements
-    return points + (_middle(mesh.points[mesh.face_nodes(sensor.spec.contact.face)]) - _middle(points))
+    return points + (_middle(mesh.points[mesh.face_nodes(sensor.spec.contact.face)]) - _middle(points))  # type: ignore[union-attr]
 
 
 def _to_touch(sensor: "Sensor", triangles: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """The displacement (3,) in mm to where triangles (t, 3, 3) first touch the contact's face."""
     spec, mesh = sensor.spec, sensor.elements
-    distance = way_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)
+    distance = way_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)  # type: ignore[union-attr]
     if not np.isfinite(distance):
         (x0, y0, z0), (x1, y1, z1) = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
         raise InputError(f"The object misses the face {spec.contact.face!r} of {spec.name}: it spans x {x0:.4g} to "
@@ -190,7 +190,7 @@ def _to_touch(sensor: "Sensor", triangles: np.ndarray, direction: np.ndarray) ->
 def _pair(sensor: "Sensor", body: SolidBody, other: Surface, *, soft: SoftObject | None = None) -> ContactPair:
     """The contact's face against the object's surface; two soft surfaces are cut along each other."""
     spec = sensor.spec
-    face = Surface.of(sensor.elements.face(spec.contact.face))
+    face = Surface.of(sensor.elements.face(spec.contact.face))      # type: ignore[union-attr]
     size = face.size_mm(body.points) if soft is None else other.size_mm(body.points)
     moduli = [3 * law.mu0 for law in sensor.laws.values()] + ([3 * soft.law.mu0] if soft else [])
     friction = max(spec.contact.friction, soft.friction if soft else 0.0)

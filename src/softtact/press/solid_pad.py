@@ -68,7 +68,7 @@ class SolidPad:
         if self._frusta is None:
             size = min(self.sensor.spec.footprint_mm) / _CELL_OF_LAYERS
             return np.linspace(-side / 2, side / 2, max(4, round(side / size)) + 1)
-        count, pitch = self.sensor.spec.frusta_counts[axis], self._frusta.pitch_mm  # type: ignore[union-attr]
+        count, pitch = self.sensor.spec.frusta_counts[axis], self._frusta.pitch_mm
         lattice = (np.arange(count + 1) - count / 2) * pitch
         rim = side / 2 - lattice[-1]
         return lattice if rim < 0.05 * pitch else np.concatenate([[-side / 2], lattice, [side / 2]])
@@ -175,20 +175,20 @@ class SolidPad:
         if self._frusta is None:
             return
         spec, law = self.sensor.spec, self._frustum_law()
-        nodes, groups = self._nodes_at(0.0), {}
+        nodes, groups = self._nodes_at(0.0), {}      # type: ignore[var-annotated]
         for cells in np.ndindex(*spec.frusta_counts):
             parts = tuple(self._parts_over(axis, cell) for axis, cell in enumerate(cells))
             key = tuple(len(part) - 1 for part in parts)
             groups.setdefault(key, []).append(nodes[2 * parts[0][0] : 2 * parts[0][-1] + 1, 2 * parts[1][0] : 2 * parts[1][-1] + 1])
         for key, above in groups.items():
             above = np.array([part.ravel() for part in above])
-            root = law.spread @ _shapes_over(law.root_xy, self._frusta.pitch_mm, key)  # type: ignore[union-attr]
+            root = law.spread @ _shapes_over(law.root_xy, self._frusta.pitch_mm, key)
             body.add(FrustumItem(above, root, law, bonded=spec.tips_bonded, friction=spec.friction.board))
 
     def _frustum_law(self) -> FrustumLaw:
         """Of bonded tips: where they may slide, the item lets them."""
         known = self.sensor.prepared_models.get("frustum")
-        return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"])  # type: ignore[arg-type]
+        return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"])
 
     def _parts_over(self, axis: int, number: int) -> np.ndarray:
         """Numbers of the ends of the elements over a frustum, by its number along an axis."""

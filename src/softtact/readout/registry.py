@@ -88,10 +88,10 @@ def make_readout(name: str, entry: ReadoutEntry, *, where: str = "sensor") -> Re
         raise InputError(f"{place}: there is no kind {entry.kind!r}{nearest(entry.kind, known)}; use one of {', '.join(known)}.")
     cls, given = _KINDS[entry.kind], dict(entry.model_extra or {})
     try:
-        return cls(**given)  # type: ignore[no-any-return]
+        return cls(**given)
     except ValidationError as error:
         fault = first_fault(error)
-        raise InputError(sentence(cls, fault, place) if issubclass(cls, BaseModel) else f"{place}: {fault['msg']}.") from None
+        raise InputError(sentence(cls, fault, place) if issubclass(cls, BaseModel) else f"{place}: {fault['msg']}.") from None  # type: ignore[arg-type]
     except TypeError as error:
         raise InputError(f"{place}: {str(error).removeprefix(f'{cls.__name__}.__init__() ')}; correct its keys.") from None
 

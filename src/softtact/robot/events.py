@@ -195,7 +195,7 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
 
 def _keep(maps: EventMaps, place: tuple[int, ...], result: "PressResult", *, step: int = 0) -> None:
     maps.deformation_map_mm[place], maps.tactile_map[place] = result.deformation_map_mm[step], result.tactile_map[step]
-    maps.pressed_force_n[place] = result.pad_force_n[step] + result.shell_force_n[step]     # type: ignore[index]
+    maps.pressed_force_n[place] = result.pad_force_n[step] + result.shell_force_n[step]
     maps.model[place], maps.selection_reason[place] = result.model, result.selection_reason or "named by the user"
     maps.within_validity[place] = result.within_validity[step]
 

@@ -57,4 +57,4 @@ def _layered(spec):
 
 def sensor_schema() -> dict[str, Any]:
     """JSON schema of a sensor file: one of the kinds."""
-    return TypeAdapter(Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]).json_schema()
+    return TypeAdapter(Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]).json_schema()  # type: ignore[arg-type]

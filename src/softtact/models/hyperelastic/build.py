@@ -200,7 +200,7 @@ def build_patch(spec: SensorSpec, counts: Sequence[int], *, dielectric_law: Law 
     mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
                       rings=mesh.frustum_rings, core=mesh.core)
     slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None),
-                SlabMesh(mesh_2d, *lines, constrained_cell_edges=mesh.constrained_cell_edges), sides="free", contact=mesh.contact,
+                SlabMesh(mesh_2d, *lines, constrained_cell_edges=mesh.constrained_cell_edges), sides="free", contact=mesh.contact,  # type: ignore[arg-type, misc]
                 quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio)
     support = _frustum_array(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
     return LayeredBody(slab, support, slab.bottom[mesh_2d.roots])
@@ -253,7 +253,7 @@ def plain_slab(spec: LayersSpec, laws: tuple[Law | None, Law | None], mesh: Mesh
     splits, _ = cover_splits(mesh, surface, x_lines, y_lines, 2 * spec.element_size_mm)
     kind = Slab if spec.cover else SingleLayerSlab
     mesh_2d = grid_without_cells(*(_fine(lines, mesh) for lines in (x_lines, y_lines)))
-    slab = kind(*_layers(spec, *laws, mesh), SlabMesh(mesh_2d, x_lines, y_lines, splits), sides=sides,
+    slab = kind(*_layers(spec, *laws, mesh), SlabMesh(mesh_2d, x_lines, y_lines, splits), sides=sides,  # type: ignore[arg-type, misc]
                 contact=contact or mesh.object_contact, quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio,
                 friction=coulomb(spec.friction.object), held_below_mm=spec.edge.held_below_mm)
     if spec.base_held:

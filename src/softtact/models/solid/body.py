@@ -331,7 +331,7 @@ class SolidBody:
         turning: with what pressures do as surfaces turn and bend, a part that may be negative
         """
         x = self.points + state.displacement
-        coupled = [part for item, *both in self.item_states(state) for part in item.tangents(*both, x, turning=turning)]
+        coupled = [part for item, *both in self.item_states(state) for part in item.tangents(*both, x, turning=turning)]  # type: ignore[misc]
         matrix = self._matrix_for(coupled)
         self._add_blocks(matrix.data, state.displacement)
         for nodes, matrices in coupled:

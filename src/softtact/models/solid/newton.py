@@ -85,7 +85,7 @@ class _Balance:
         frame_steps = [np.zeros(6) for _ in body.frames]
         histories = state.item_histories
         if self.pending:
-            histories = with_pressures(body.items, histories, self.target.pressures)
+            histories = with_pressures(body.items, histories, self.target.pressures)      # type: ignore[arg-type]
             residual, off = self._predicted(state, residual, off, frame_steps)
         columns, corner = [], np.zeros((len(unknown), len(unknown)))
         for k, (frame, freedom) in enumerate(unknown):
