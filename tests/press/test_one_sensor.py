@@ -100,7 +100,8 @@ def test_a_readout_from_outside_and_those_of_the_package_read_a_solid(sensors):
     middle = result.readings["middle"]
     assert middle.dims == ("step", "point", "quantity") and (middle.sel(quantity="pressure") > 0).all()
     assert (middle.sel(quantity="z") < 0).all() and middle["units"].values.tolist() == ["MPa", "mm", "mm", "mm"]
-    assert strips(result) == pytest.approx([0.05, 0.1], rel=0.02)      # a ball presses normal to a bent surface
+    # Seen: 0.0496 and 0.0985 N. Presumably because pressure acts along the normal of a bent surface, which nobody has measured.
+    assert strips(result) == pytest.approx([0.05, 0.1], rel=0.02)
 
 
 @pytest.mark.parametrize("kind", KINDS)
