@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.contact.edges import ENDS, contact_compliance, own_areas
+from softtact.contact.edges import ENDS, contact_compliance, point_areas
 from softtact.contact.penalty import Contact
 from softtact.fem.quadrature import gauss
 
@@ -54,9 +54,9 @@ def test_softness_grows_with_the_face():
                        2 * contact_compliance(share, WIDTH))
 
 
-def test_the_own_areas_of_a_faces_points_fill_it():
+def test_the_point_areas_of_a_faces_points_fill_it():
     points, _ = gauss(3, 2)
-    corners = own_areas(np.array([[0.3, 0.2]]), points)[0] + (np.array([0.3, 0.2]) * points)[:, None]
+    corners = point_areas(np.array([[0.3, 0.2]]), points)[0] + (np.array([0.3, 0.2]) * points)[:, None]
     sides = np.ptp(corners, axis=1)
     assert sides.prod(axis=1).sum() == pytest.approx(0.6 * 0.4) and np.allclose(np.unique(corners[..., 0].round(9)), 0.3 * ENDS)
 
