@@ -54,7 +54,7 @@ def test_softness_grows_with_the_face():
                        2 * contact_compliance(share, WIDTH))
 
 
-def test_the_point_areas_of_a_faces_points_fill_it():
+def test_the_areas_of_a_faces_points_fill_it():
     points, _ = gauss(3, 2)
     corners = point_areas(np.array([[0.3, 0.2]]), points)[0] + (np.array([0.3, 0.2]) * points)[:, None]
     sides = np.ptp(corners, axis=1)
@@ -65,7 +65,7 @@ def test_a_points_spring_gives_way_by_its_softness_times_the_pressure():
     """In series with a penalty of 1 / 3000 mm/MPa, at twice the depth where it is linear."""
     contact, gap = Contact(contact_compliance=np.array([0.0, 0.01])), np.array([-2e-3, -2e-3])
     _, pressure, _ = contact.response(gap)
-    assert np.allclose(contact.own_gaps(gap), gap + [0.0, 0.01 * pressure[1]]) and pressure[1] < pressure[0] / 20
+    assert np.allclose(contact.surface_gaps(gap), gap + [0.0, 0.01 * pressure[1]]) and pressure[1] < pressure[0] / 20
 
 
 def test_the_compression_of_a_spring_is_not_augmented():
