@@ -20,6 +20,7 @@ import softtact
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import default_pose, read_mesh
 from softtact.geometry.pose import Pose
+from softtact.press.task import cores
 
 MODELS = ("elastic", "foundation")
 FORCES = np.linspace(2.5, 50.0, 20)
@@ -78,8 +79,8 @@ def on_gpu(sensor, count):
     """The elastic model's presses on the processor and on the GPU, and how far their maps lie apart."""
     meshes, poses = random_presses(2)
     sensor.press_many(meshes, poses, force_n=[20.0], model="elastic", device="cuda", label="")     # starts CUDA
-    cores = softtact.press.sensor.cores()
-    rows, maps = many(sensor, count, [("elastic", "cpu", 1), ("elastic", "cpu", cores), ("elastic", "cuda", cores)])
+    processes = cores()
+    rows, maps = many(sensor, count, [("elastic", "cpu", 1), ("elastic", "cpu", processes), ("elastic", "cuda", processes)])
     apart = max(float(np.abs(maps["cuda"][k] - maps["cpu"][k]).max()) for k in maps["cuda"].keys() & maps["cpu"].keys())
     print(record.write("fast_models_cuda", device=torch.cuda.get_device_name(), many=rows, largest_difference_mm=apart))
 

@@ -39,7 +39,7 @@ def make(paths, items):
                 for model in ("elastic", "foundation")}
         valid = maps["elastic"].within_validity & maps["foundation"].within_validity
         presses["elastic", set_name, item] = maps["elastic"].to_dataset().assign(within_validity=("step", valid))
-        counts = read_virtual_sensor(sensor.spec, maps["foundation"].deformation_map_mm, trials=TRIALS, seed=SEED,
+        counts = read_virtual_sensor(sensor.spec, maps["foundation"].deformation_map_mm, force_n=FORCES, trials=TRIALS, seed=SEED,
                                      item=f"{set_name}/{item}")
         tactile[set_name, item] = xarray.Dataset({"tactile_map": (("trial", "force", "row", "column"), counts),
                                                   "force_n": ("force", FORCES)}, attrs={"source": SOURCE})

@@ -8,10 +8,12 @@ import trimesh
 
 from softtact.contact.motion import Motion
 from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.build import build_plain_body
+from softtact.models.hyperelastic.body import LayeredBody
+from softtact.models.hyperelastic.build import plain_slab
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_motion
+from softtact.models.hyperelastic.support import Support
 from softtact.press.sensor import load_sensor
 
 pytestmark = pytest.mark.slow
@@ -31,8 +33,8 @@ def test_a_stuck_plate_shears_a_wide_bonded_layer_by_its_modulus(record):
     layer = spec.layers[0].model_copy(update={"thickness_mm": thickness})
     spec = spec.model_copy(update={"footprint_mm": (10.0, 6.0), "map_shape": (13, 21), "layers": (layer,), "element_mm": 0.5,
                                    "friction": spec.friction.model_copy(update={"object": 40.0})})
-    body = build_plain_body(spec, dielectric_law=make_law("neo_hooke", {"c10": 0.5 * shear}, bulk_modulus=2 * shear), mesh=COARSE,
-                            sides="free")
+    law = make_law("neo_hooke", {"c10": 0.5 * shear}, bulk_modulus=2 * shear)
+    body = LayeredBody(plain_slab(spec, (law, None), COARSE, sides="free"), Support(spec.support, COARSE.contact))
 
     def plate(x, y):
         return np.zeros_like(x), np.tile([0.0, 0.0, -1.0], (len(x), 1))
