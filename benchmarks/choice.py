@@ -15,7 +15,7 @@ import record
 from objects import CONFIG, MAPS
 
 import softtact
-from softtact.evaluation.policies import MODELS, policy_table, press_table, told_over_true
+from softtact.evaluation.policies import MODELS, expected_over_true, policy_table, press_table
 from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import place, read_mesh
 from softtact.reporting.style import save
@@ -61,11 +61,11 @@ def main():
                                     height_mm=sensor.spec.dielectric.frusta.height_mm)
     policies = policy_table(table, TOLERANCES_MM, sets=["grasps"])
     unseen = table[table.set == "grasps"]
-    told = {model: {key: float(value) for key, value in told_over_true(unseen, model).items()} for model in FAST}
-    print(table.to_string(), policies.to_string(), calibrated, told, sep="\n\n")
+    ratios = {model: {key: float(value) for key, value in expected_over_true(unseen, model).items()} for model in FAST}
+    print(table.to_string(), policies.to_string(), calibrated, ratios, sep="\n\n")
     save(draw(policies, table), FIGURE, FIGURE.with_suffix(".svg"))
     FIGURE.with_suffix(".svg").unlink()
-    print(record.write("choice", against=MESH, calibrated=asdict(calibrated), told_over_true=told, presses=rows_of(table),
+    print(record.write("choice", against=MESH, calibrated=asdict(calibrated), told_over_true=ratios, presses=rows_of(table),
                        policies=rows_of(policies)))
 
 

@@ -65,7 +65,7 @@ PRESS = "press part.stl --unit mm --force 5"
     (f"{FIT} --weight uniaxial=5", "The weight of the only mode has no effect"),
     (f"{FIT} volumetric=volume.csv --weight volumetric=5", "The weight of volumetric has no effect"),
     (f"{FIT} --window planar=1:1.2", "The window of planar has no effect, for there is no planar curve"),
-    (f"{FIT} --window uniaxial=1:1.2 --window uniaxial=1:1.5", "uniaxial was given before, as 1:1.2; give it once"),
+    (f"{FIT} --window uniaxial=1:1.2 --window uniaxial=1:1.5", "uniaxial was already given as 1:1.2; give it once"),
     (f"{FIT} --small-strain 0.2", "--small-strain 0.2: it has no effect without --poisson or a volumetric curve"),
     (f"{FIT} volumetric=volume.csv --bulk-over-shear 20", "--bulk-over-shear 20: it has no effect beside a volumetric curve"),
     (f"{FIT} --mode planar", "the mode planar for all files has no effect, for each states one"),
@@ -77,9 +77,9 @@ PRESS = "press part.stl --unit mm --force 5"
     (f"{PRESS} --model hyperelastic --tolerance 0.1", "--tolerance 0.1: it has no effect on the hyperelastic model"),
     (f"{PRESS} --policy paper --tolerance 0.1", "--tolerance 0.1: it has no effect on the policy paper"),
     (f"{PRESS} --model elastic --full-scale", "--full-scale: it has no effect without --plot"),
-    (f"{PRESS} --model hyperelastic --card cover=a.json --card cover=b.json", "cover was given before, as a.json"),
+    (f"{PRESS} --model hyperelastic --card cover=a.json --card cover=b.json", "cover was already given as a.json"),
     ("detect-discs a.png --pixel-mm 1 --out d.csv --picture p --no-picture", "--picture p: it has no effect with --no-picture"),
-    ("stage make_tables --out card=c.json", "PATH is missing, which this stage needs"),
+    ("stage make_tables --out card=c.json", "PATH is missing; this stage needs it"),
 ])
 def test_an_option_without_effect_is_refused(folder, capsys, line, sentence):
     before = set(folder.iterdir())

@@ -1,4 +1,4 @@
-"""Simulate a soft tactile sensor: press a mesh on it, read its deformation and what its readouts tell."""
+"""Simulate a soft tactile sensor: press a mesh on it, read its deformation and the readings of its readouts."""
 
 import importlib
 from typing import TYPE_CHECKING

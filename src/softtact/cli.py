@@ -1,7 +1,7 @@
 """The command `softtact`: its commands are the modules of `softtact.commands`.
 
 An error that the user can correct ends with one sentence on stderr and an exit status (`softtact.commands.common.EXIT_STATUS`).
-Heavy imports stand inside the commands' functions, so that `softtact --help` answers at once.
+The commands import heavy packages inside their functions, so that `softtact --help` answers at once.
 """
 
 import argparse
@@ -93,7 +93,7 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {self._with_minus(message) or message}; see {self.prog} --help.\n")
 
     def _with_minus(self, message):
-        """A better sentence where an option lacks a value because that begins with a minus and reads as another option."""
+        """The message for an option whose value begins with a minus, which argparse takes for another option; else None."""
         option = re.match(r"argument (?:\S+/)?(--[\w-]+):? .*expected ", message)
         for word, value in zip(self._words, self._words[1:], strict=False):
             if option and option[1].startswith(word) and re.match(r"-[\d.]", value):

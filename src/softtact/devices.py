@@ -8,16 +8,16 @@ from typing import Any
 
 from softtact.errors import InputError, how_to_install
 
-# A library's name in messages, the names of devices that it takes, and these in words.
+# For each library: its name in messages, a pattern of the device names that it accepts, and these names for a message.
 _NAMES = {"torch": ("torch", r"cpu|auto|cuda(:\d+)?", "'cpu', 'cuda', 'cuda:1' or 'auto'"),
           "warp": ("Warp", "cpu|auto|cuda|warp", "'cpu', 'warp', 'cuda' or 'auto'")}
 _DRIVERS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd")     # NVIDIA's, that of Windows' subsystem for Linux, AMD's
 
 
 def find_device(name: str, *, library: str = "torch") -> str:
-    """`cpu`, or the library's name of a GPU: `auto` is one where there is one, `cuda` asks for it.
+    """The device for a name: `cpu`, or the library's name of a GPU. `auto` takes a GPU if there is one; `cuda` requires one.
 
-    library: torch, which also takes `cuda:1`, or warp, which sums up elements on the processor, too, under the name `warp`
+    library: torch, which also accepts `cuda:1`, or warp, which also assembles elements on the processor, under the name `warp`
     Raises InputError where the name is unknown, or the GPU that was asked for is not there.
     """
     title, pattern, choices = _NAMES[library]
@@ -26,13 +26,13 @@ def find_device(name: str, *, library: str = "torch") -> str:
     if name in ("cpu", "warp") or (name == "auto" and not _has_driver()):
         return name.replace("auto", "cpu")
     try:
-        module: Any = importlib.import_module(library)     # seconds, which a machine without a driver need not wait for
+        module: Any = importlib.import_module(library)     # takes seconds, so only where there is a driver
     except ModuleNotFoundError:
         if name == "auto":
             return "cpu"
         raise InputError(f"device={name!r}: {how_to_install(library)}") from None
     if library == "warp":
-        module.config.log_level = module.LOG_WARNING     # its notices would stand in a command's output
+        module.config.log_level = module.LOG_WARNING     # else its notices mix with a command's output
     if module.is_cuda_available() if library == "warp" else module.cuda.is_available():
         return "cuda" if name == "auto" else name
     if name == "auto":
@@ -41,5 +41,5 @@ def find_device(name: str, *, library: str = "torch") -> str:
 
 
 def _has_driver():
-    """Whether a GPU's driver may be there; for sure only on Linux."""
+    """Whether a GPU driver may be installed; a False is certain on Linux, other systems always give True."""
     return os.name == "nt" or any(Path(path).exists() for path in _DRIVERS)

@@ -1,4 +1,4 @@
-"""Pictures drawn in a separate process: a driver of OpenGL that fails may end its process, or never answer."""
+"""Pictures drawn in a separate process, because an OpenGL driver that fails may crash its process or hang."""
 
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,9 @@ from softtact.progress import announce
 
 def drawn_apart(command: Sequence[str], folder: Path, *, sentence: str, timeout_s: float,
                 environment: Mapping[str, str] | None = None) -> dict[str, np.ndarray] | None:
-    """Arrays by name of `images.npz`, which a command writes into the folder that is its last argument.
+    """Run a command that writes `images.npz` into the folder, its last argument; return the arrays of that file by name.
 
-    None where it fails or does not answer in time, after a `sentence` on stderr.
+    Returns None, and prints `sentence` on stderr, if the command fails or takes longer than `timeout_s`.
     """
     try:
         done = subprocess.run([*command, str(folder)], capture_output=True, text=True, timeout=timeout_s, env=environment)

@@ -1,4 +1,4 @@
-"""What softtact raises, each with one sentence that names the thing, its value and the remedy; which extra brings which package."""
+"""Errors and warnings of softtact, and which extra installs which package. A message names the field, its value and the remedy."""
 
 from typing import Any
 
@@ -31,19 +31,19 @@ class ConvergenceError(SofttactError):
 
 
 class TimeLimitError(ConvergenceError):
-    """The time that was given for a press is over; `result` holds the steps that were reached."""
+    """The time limit of a press was reached; `result` holds the finished load steps."""
 
 
 class ExtrapolationWarning(UserWarning):
-    """A law is used where the data behind its material card do not reach."""
+    """A law is used outside the range of the data that its material card was fitted to."""
 
 
 class ShellWarning(UserWarning):
-    """An object rests on the shell around a pad, which carries what is added to its force."""
+    """An object rests on the shell around a pad, and the shell carries any further force."""
 
 
 class FrameWarning(UserWarning):
-    """A camera frame may not be what the detection of discs takes it for."""
+    """A camera frame may not meet the assumptions of the detection of discs."""
 
 
 def missing_extra(error: ImportError) -> str | None:

@@ -1,4 +1,4 @@
-"""Reading and writing: whole files or none, labelled, with their provenance inside."""
+"""Read and write files. A file is written completely or not at all, with labels and provenance inside."""
 
 import contextlib
 import errno
@@ -55,7 +55,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 
 def refuse_overwriting(inputs: Iterable[Path | str | None], outputs: Mapping[str, Path | None]) -> None:
-    """Refuse an output {option: file or None} that is one of the inputs, or another output, by whatever path, link or name."""
+    """Refuse an output {option: file or None} that is the same file as an input or another output, also through links."""
     read = [Path(path) for path in inputs if path]
     written: dict[str, Path] = {}
     for option, path in ((option, path) for option, path in outputs.items() if path):
@@ -69,7 +69,7 @@ def refuse_overwriting(inputs: Iterable[Path | str | None], outputs: Mapping[str
 
 
 def _same_file(one, other):
-    """Whether two paths lead to one file, be it there or not."""
+    """Whether two paths lead to the same file, existing or not."""
     if one.exists() and other.exists():
         return one.samefile(other)
     return one.resolve() == other.resolve()
@@ -84,10 +84,10 @@ def _not_written(path, error):
 
 
 class _OnceLoader(yaml.SafeLoader):
-    """PyYAML's safe loader, which refuses a key that is there twice in a mapping; PyYAML itself keeps the last in silence."""
+    """PyYAML's safe loader, made to refuse a duplicate key in a mapping; PyYAML silently keeps the last."""
 
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        """The node of a mapping, before merges (`<<`) add keys that it may well override."""
+        """The node of a mapping before merges (`<<`), since a mapping may override a merged key."""
         node = super().compose_mapping_node(anchor)
         lines: dict[Any, int] = {}
         for key, _ in node.value:
@@ -103,9 +103,9 @@ class _OnceLoader(yaml.SafeLoader):
 
 
 def read_yaml(path: str | Path, *, missing: str) -> Any:
-    """What a YAML file holds; `missing` says of a file that is not there what to do about it.
+    """The content of a YAML file. `missing`: what to do if the file does not exist, for the error message.
 
-    A key that is there twice in one mapping is refused.
+    Raises InputError if there is no such file, if it is not valid YAML, or if a mapping has a key twice.
     """
     try:
         loader = _OnceLoader(Path(path).read_text(encoding="utf-8"))
@@ -134,7 +134,7 @@ def write_json(path: str | Path, obj: Any) -> None:
 
 
 def parse_json(text: str) -> Any:
-    """The object of a JSON text; a key that is there twice, of which Python would keep the last, raises ValueError as faults do."""
+    """The object of a JSON text. Raises ValueError for invalid JSON and for a duplicate key, which Python would accept."""
     def once(pairs):
         names = [name for name, _ in pairs]
         twice = next((name for name in names if names.count(name) > 1), None) if len(set(names)) < len(names) else None
@@ -167,7 +167,7 @@ def write_dataset(path: str | Path, dataset: "xr.Dataset", *, seed: int | None, 
     The same data set gives the same bytes: no time stamp or path is stored.
     """
     provenance = dict(zip(PROVENANCE, (softtact.__version__, digest(settings), -1 if seed is None else int(seed)), strict=True))
-    content = io.BytesIO()    # HDF5 itself leaves the process in ruins where the disk is full
+    content = io.BytesIO()    # HDF5 can crash the process if it writes to a full disk
     dataset.assign_attrs(provenance).to_netcdf(content, engine="h5netcdf")
     with atomic_path(path) as temporary:
         temporary.write_bytes(content.getbuffer())

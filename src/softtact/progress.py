@@ -1,4 +1,4 @@
-"""Progress of long work: a line on stderr now and then, readable in a log as on a screen."""
+"""Progress of long work: lines on stderr at intervals, readable on a screen and in a log."""
 
 import sys
 import time
@@ -8,13 +8,13 @@ from typing import TypeVar
 from softtact.errors import TimeLimitError
 
 _Item = TypeVar("_Item")
-_ON_SCREEN_S, _IN_A_LOG_S = 0.5, 10.0     # between two lines: on a screen one takes the place of the other
+_ON_SCREEN_S, _IN_A_LOG_S = 0.5, 10.0     # between two lines; on a screen each overwrites the last
 
 
 def progress(iterable: Iterable[_Item], *, label: str, total: int | str | None = None, interval_s: float = 2.0) -> Iterator[_Item]:
     """Yield the items of `iterable`; write `label: 3/20, 12 s` on stderr at most every `interval_s` seconds.
 
-    An empty label writes nothing: the work is part of some other that reports its progress.
+    An empty label writes nothing, for work inside a larger task that reports its progress itself.
     """
     total = total if total is not None else len(iterable)     # type: ignore[arg-type]
     start = shown = time.monotonic()
@@ -27,14 +27,14 @@ def progress(iterable: Iterable[_Item], *, label: str, total: int | str | None =
 
 
 def announce(text: str) -> None:
-    """Say on stderr what begins now and may take a while."""
+    """Report on stderr the start of work that may take a while."""
     print(text, file=sys.stderr, flush=True)
 
 
 class Watch:
-    """How far one long computation is, on one line of stderr, and when its time is over.
+    """Progress of one long computation on one line of stderr, and its time limit.
 
-    label: first words of the report, an empty one reports nothing;  limit_s: wall-clock seconds from now on, or None
+    label: start of the line; with an empty one nothing is reported;  limit_s: wall-clock seconds from now, or None
     """
 
     def __init__(self, label: str = "", *, limit_s: float | None = None) -> None:
@@ -42,8 +42,8 @@ class Watch:
         self._screen = sys.stderr.isatty()
         self._shown, self._open = self._start, False
 
-    def beat(self, where: str) -> None:
-        """Tell `where` the computation is, now and then; raise TimeLimitError where its time is over."""
+    def report(self, where: str) -> None:
+        """Report at intervals `where` the computation is; raise TimeLimitError once the time limit is reached."""
         now = time.monotonic()
         spent = now - self._start
         if self._limit_s is not None and spent > self._limit_s:
@@ -56,7 +56,7 @@ class Watch:
             self._shown, self._open = now, self._screen
 
     def end(self) -> None:
-        """End the line, where one is written."""
+        """End the line, if one was written."""
         if self._open:
             print(file=sys.stderr, flush=True)
             self._open = False

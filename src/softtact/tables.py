@@ -1,11 +1,11 @@
-"""Tables of users' files: CSV in the dialects that programs write, and sheets of Excel, which openpyxl reads (extra `excel`).
+"""Read users' tables: CSV in the dialects of common programs, and Excel sheets with openpyxl (extra `excel`).
 
-A table is read as it declares itself, or refused; nothing in it is guessed.
-  encoding    UTF-8, UTF-16 with its mark, else that of Windows (cp1252)
-  separator   tab, semicolon or comma, whichever the header has, in this order; or what a first line `sep=;` states
-  fields      each row as many as the header, so that a comma in a number, or the name of a row, shifts no column
-  numbers     a decimal point, or a comma where the caller states so; none of thousands, for 1,234 may be either
-  `#`         begins a line of notes
+A table whose dialect is ambiguous is refused; nothing is guessed.
+  encoding    UTF-8, UTF-16 with a byte order mark, else that of Windows (cp1252)
+  separator   the first of tab, semicolon and comma that the header contains; or the one of a first line `sep=;`
+  fields      each row has as many as the header, so that a comma in a number, or a row's name, cannot shift columns
+  numbers     with a decimal point, or a comma if the caller states so; no thousands separators, since 1,234 is ambiguous
+  `#`         starts a line of notes
 """
 
 import codecs
@@ -21,13 +21,13 @@ from softtact.errors import InputError
 
 SEPARATORS = "\t;,"
 DECIMALS = (".", ",")
-_SEP_LINE = re.compile(r'"?sep=(\\t|[^\w\s".]|\t)"?\s*', flags=re.IGNORECASE)      # what Excel reads in a first line
+_SEP_LINE = re.compile(r'"?sep=(\\t|[^\w\s".]|\t)"?\s*', flags=re.IGNORECASE)      # a first line for Excel
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", flags=re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", flags=re.IGNORECASE)
-_NOT_CP1252 = set(b"\0\x81\x8d\x8f\x90\x9d")     # bytes that are no letter there
+_NOT_CP1252 = set(b"\0\x81\x8d\x8f\x90\x9d")     # bytes without a character in cp1252
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _STATE = "state the decimal comma (--decimal ,)"
-_ROWS_TO_COMPARE = 5    # of fewer rows the length of their numbers shows nothing
+_ROWS_TO_COMPARE = 5    # fewest rows from which the usual length of a number is known
 WORKBOOKS = (".xlsx", ".xlsm")
 Cell = str | float
 
@@ -36,8 +36,8 @@ Cell = str | float
 class Table:
     """A header and the rows below it.
 
-    header: the columns' names;  rows: [(number in the file, from 1, cells)], text or, of Excel, numbers
-    notes: texts of the lines that begin with `#`;  decimal: `.` or `,`, or None: the point, and no other can be stated
+    header: the columns' names;  rows: [(row number in the file from 1, cells)]; cells are text, in Excel also numbers
+    notes: lines that begin with `#`;  decimal: `.` or `,`, or None: a point, and the caller has no option to change it
     """
 
     path: Path
@@ -47,12 +47,12 @@ class Table:
     decimal: str | None = None
 
     def positions(self, name: str) -> list[int]:
-        """Positions of the columns of this name, and of those that are called as programs call a name that is there twice."""
+        """Positions of the columns of this name, also with the suffixes that programs add to a duplicate name."""
         repeated = re.compile(re.escape(name) + r"([._]\d+| \(\d+\))")
         return [at for at, text in enumerate(self.header) if text == name or (name in self.header and repeated.fullmatch(text))]
 
     def numbers(self, names: Sequence[str]) -> list[list[float]]:
-        """[[values (n,)], ...] of the one column of each name; a cell that holds no finite number is refused by its row."""
+        """Values (n,) of the column of each name. Raises InputError unless there is one such column and its cells are numbers."""
         at = []
         for name in names:
             found = self.positions(name)
@@ -67,12 +67,12 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
                decimal: str | None = None, skip_rows: int = 0, sheet: str | None = None) -> Table:
     """The `Table` of a CSV file or of a sheet of Excel.
 
-    what: what the table is, for a refusal
-    marker: a text in the header, which then may lie below other lines, as in the `layout` of that name; without it the header is
+    what: what the table is, for an error message
+    marker: a text by which the header is found below other lines, as in the `layout` of that name; by default the header is
     the first line
-    decimal: `.` or `,` as the user stated it, or None: the point, and no other can be stated
-    skip_rows: lines above that are passed over;  sheet: the name of a workbook's sheet, where it has several
-    Raises InputError that names file, row and remedy.
+    decimal: `.` or `,` as the user stated it, or None: a point, and the caller has no option to change it
+    skip_rows: number of lines to skip at the top;  sheet: the name of a workbook's sheet, required if several hold data
+    Raises InputError with file, row and remedy.
     """
     path = Path(path)
     if decimal not in (None, *DECIMALS):
@@ -97,7 +97,7 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
 
 def read_bare(path: str | Path, *, header: Sequence[str], what: str = "table", decimal: str | None = None,
               skip_rows: int = 0) -> Table:
-    """The `Table` of a file of numbers with blanks between them and no header; `header` names its columns."""
+    """The `Table` of a file of numbers separated by blanks, without a header; `header` names its columns."""
     text = read_text(path, what=what)
     notes, lines = _parted([(row, line) for row, line in _numbered(text) if row > skip_rows])
     table = Table(Path(path), list(header), [(row, list(line.split())) for row, line in lines], notes, decimal)
@@ -105,7 +105,7 @@ def read_bare(path: str | Path, *, header: Sequence[str], what: str = "table", d
 
 
 def read_matrix(path: str | Path, *, what: str = "table") -> list[list[float]]:
-    """The numbers (rows, columns) of a CSV file without a header; each row has as many as the first."""
+    """The numbers (rows, columns) of a CSV file without a header."""
     path, text = Path(path), read_text(path, what=what)
     separator, lines = _stated_separator(text)
     _, lines = _parted(lines)
@@ -119,7 +119,7 @@ def read_matrix(path: str | Path, *, what: str = "table") -> list[list[float]]:
 
 
 def read_text(path: str | Path, *, what: str = "table") -> str:
-    """The text of a file whose encoding is UTF-8, UTF-16 or cp1252; what is no text is refused."""
+    """The text of a file in UTF-8, UTF-16 or cp1252. Raises InputError if the file is not text."""
     try:
         raw = Path(path).read_bytes()
     except (FileNotFoundError, IsADirectoryError):
@@ -129,14 +129,14 @@ def read_text(path: str | Path, *, what: str = "table") -> str:
     try:
         text = raw.decode(encoding_of(path))
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: its letters cannot be read ({error.reason} at byte {error.start}); save it as UTF-8.") from None
+        raise InputError(f"{path}: it cannot be read as text ({error.reason} at byte {error.start}); save it as UTF-8.") from None
     if "\0" in text:
-        raise InputError(f"{path}: it holds bytes of zero, so it is no text, or UTF-16 without its mark; save it as UTF-8.")
+        raise InputError(f"{path}: it holds zero bytes, so it is not text, or UTF-16 without a byte order mark; save it as UTF-8.")
     return text
 
 
 def encoding_of(path: str | Path) -> str:
-    """The name of a text file's encoding: UTF-16 by its mark, UTF-8 where all of it is, else cp1252."""
+    """The name of a text file's encoding: UTF-16 with a byte order mark, UTF-8 if all of it is valid, else cp1252."""
     decoder = codecs.getincrementaldecoder("utf-8")()
     with open(path, "rb") as file:
         if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
@@ -149,13 +149,13 @@ def encoding_of(path: str | Path) -> str:
         except UnicodeDecodeError as error:
             file.seek(0)
             if any(set(piece) & _NOT_CP1252 for piece in iter(lambda: file.read(1 << 20), b"")):
-                raise InputError(f"{path}: its letters are neither UTF-8 ({error.reason}) nor cp1252; save it as UTF-8.") from None
+                raise InputError(f"{path}: its text is neither UTF-8 ({error.reason}) nor cp1252; save it as UTF-8.") from None
             return "cp1252"
     return "utf-8-sig"
 
 
 def number(path: Path, row: int, cell: Cell, *, decimal: str | None = None) -> float:
-    """The finite number in a cell; another content is refused with its row and a remedy."""
+    """The finite number in a cell. Raises InputError, with the row and a remedy, for other content."""
     if isinstance(cell, float):
         value, text = cell, f"{cell:g}"
     else:
@@ -204,9 +204,9 @@ def _numbered(text):
 
 
 def _parted(lines):
-    """The notes, and the other lines that are not blank; a line of separators alone is blank.
+    """The notes, and the other lines that are not blank; a line of only separators counts as blank.
 
-    Below the header a note is `#` and a blank: a row may begin with an error of Excel's, such as #N/A.
+    Below the header a note starts with `#` and a blank, since a row may start with an Excel error such as #N/A.
     """
     notes: list[str] = []
     others: list[tuple[int, str]] = []
@@ -227,13 +227,13 @@ def _header_at(path, lines, marker, layout):
 
 
 def _separator(header):
-    """The first of tab, semicolon and comma in the header outside of quotes: below it a comma may be decimal."""
+    """The first of tab, semicolon and comma in the header outside quotes; in the rows a comma may be a decimal sign."""
     bare = re.sub(r'"[^"]*"', "", header.strip())
     return next((separator for separator in SEPARATORS if separator in bare), ",")
 
 
 def _records(path, lines, separator):
-    """[(number of its first line, cells)] of the lines; quotes that do not close are refused."""
+    """[(number of its first line, cells)] of each record. Raises InputError for unbalanced quotes."""
     started: list[int] = []
 
     def fed():
@@ -247,13 +247,13 @@ def _records(path, lines, separator):
             records.append((started[taken], [cell.strip() for cell in cells]))
             taken = len(started)
     except csv.Error as error:
-        raise InputError(f"{path}, row {started[taken]}: its quotes are not right ({error}); write each field in a pair of quotes, "
+        raise InputError(f"{path}, row {started[taken]}: it has unbalanced quotes ({error}); put each field in a pair of quotes, "
                          "or in none.") from None
     return records
 
 
 def _whole(table, text, separator):
-    """The table of a text, if its rows are whole; `separator` in words."""
+    """The table, after the check that its rows are complete; `separator` in words."""
     _check_widths(table, separator)
     if not text.endswith(("\n", "\r")):
         _check_end(table)
@@ -261,7 +261,7 @@ def _whole(table, text, separator):
 
 
 def _check_widths(table, separator):
-    """Refuse a row of more or fewer fields than the header: whatever the reason, its columns may be shifted."""
+    """Refuse a row with more or fewer fields than the header, because its columns may be shifted."""
     width = len(table.header)
     wrong = [(row, cells) for row, cells in table.rows if len(cells) != width]
     if not wrong:
@@ -282,7 +282,7 @@ def _check_widths(table, separator):
 
 
 def _check_end(table):
-    """Refuse a last number that is shorter than those above it where no line end follows: the file may be cut off within it."""
+    """Refuse a last number without a line end that is shorter than those above: the file may be truncated within it."""
     if len(table.rows) < 2:
         return
     *above, last = [_lengths(cells[-1]) for _, cells in table.rows]
@@ -295,7 +295,7 @@ def _check_end(table):
 
 
 def _lengths(cell):
-    """Numbers of digits, and of digits behind the decimal sign, in a text."""
+    """Number of digits, and of digits after the decimal sign, in a text."""
     return sum(map(str.isdigit, cell)), sum(map(str.isdigit, "".join(re.split("[.,]", cell)[1:])))
 
 
@@ -313,10 +313,10 @@ def _of_sheet(path, records, *, what, marker, layout, decimal):
 
 
 def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int, list[Cell]]]:
-    """[(row number from 1, cells)] of a sheet: numbers as float, all else as text, "" of an empty cell.
+    """[(row number from 1, cells)] of a sheet: numbers as float, all else as text, "" for an empty cell.
 
-    sheet: its name; without one the workbook's only sheet that holds anything
-    Raises InputError that names the file and the remedy.
+    sheet: its name; by default the only sheet that is not empty
+    Raises InputError with the file and the remedy.
     """
     import openpyxl  # of an extra: where it is missing, the command says which
 
@@ -325,7 +325,7 @@ def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int,
     try:
         book = openpyxl.load_workbook(path, data_only=True)
         sheets = {page.title: page for page in book.worksheets}
-    except Exception as error:     # the reader of the zip and its XML raises whatever its parts do
+    except Exception as error:     # the readers of zip and XML raise errors of many kinds
         reason = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: not a readable workbook ({reason}); save it again as .xlsx, or as CSV.") from None
     page = sheets[_chosen(path, sheets, sheet)]
@@ -340,13 +340,13 @@ def _chosen(path, sheets, sheet):
         return sheet
     filled = [name for name, page in sheets.items() if any(value is not None for row in page.values for value in row)]
     if len(filled) != 1:
-        found = f"several sheets hold something, {', '.join(filled)}" if filled else "no sheet holds anything"
+        found = f"several sheets hold data, {', '.join(filled)}" if filled else "all sheets are empty"
         raise InputError(f"{path}: {found}; name the one to read (--sheet NAME).")
     return filled[0]
 
 
 def _cell(path, cell):
-    """A cell's content. A number that is shown as percent is refused: what is seen is a hundred times what is stored."""
+    """A cell's content. Raises InputError for a number shown as percent: Excel displays a hundred times the stored value."""
     value = cell.value
     if value is None:
         return ""

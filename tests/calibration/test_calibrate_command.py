@@ -43,7 +43,7 @@ def test_calibrate_writes_a_sensor_that_presses_and_a_page_with_its_residuals(fo
     page = (folder / "page.html").read_text()
     assert page.count("data:image/png;base64,") == 3 and "Which press would help most" in page and "plate.csv; bar.csv" in page
     assert main([*line.replace("small.yaml", "mine.yaml").replace("--out mine", "--out again").split()]) == 1
-    assert "is calibrated already" in capsys.readouterr().err and not (folder / "again.yaml").exists()
+    assert "is already calibrated" in capsys.readouterr().err and not (folder / "again.yaml").exists()
 
 
 @pytest.mark.parametrize(("line", "sentence"), [
@@ -53,7 +53,7 @@ def test_calibrate_writes_a_sensor_that_presses_and_a_page_with_its_residuals(fo
     (BOTH.replace("--fit none", "--fit cover"), "The elastic model is one layer and knows no cover"),
     (BOTH.replace("--force plate_force.csv --force bar_force.csv", "--force 2000"), "--force 2000: its largest force is 2000 N"),
     (BOTH + " --place 1,2", "--place 1,2: it is not three numbers"),
-    (BOTH + " --finger 1", "plate.csv: finger 1 moves by"),
+    (BOTH + " --finger 1", "plate.csv: finger 1 changes by"),
     (BOTH, "bar.csv: the press explains"),     # the bar did not lie in the middle
     (BOTH.replace("mine.yaml", "small.yaml"), "--out small.yaml: it is the input"),
     (BOTH.replace("mine.yaml", "mine.txt"), "mine.txt: the file is written as .yaml or .yml"),
@@ -95,7 +95,7 @@ def test_view_plays_a_recording(folder, capsys, name):
 @pytest.mark.parametrize(("line", "sentence"), [
     ("view bar.csv --page p.html", "--page p.html: a recording is drawn as .png, .gif or .mp4"),
     ("view bar.csv --save p.svg", "p.svg: the file is written as .png or .gif or .mp4"),
-    ("view press.nc --force-log bar_force.csv --save p.png", "--force-log and --baseline have an effect on the .csv"),
+    ("view press.nc --force-log bar_force.csv --save p.png", "--force-log and --baseline have an effect only on the .csv"),
     ("view plate.stl.csv --save p.png", "plate.stl.csv: there is no such file"),
 ])
 def test_view_refuses_what_it_cannot_play(folder, capsys, line, sentence):

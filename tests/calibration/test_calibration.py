@@ -138,7 +138,7 @@ def test_swapped_fingers_are_noticed(bench, experiments):
     bar, ball = experiments[2], experiments[1]
     with pytest.raises(InputError, match="the other finger follows the press clearly better; are the fingers swapped"):
         recorded(bench, bar, counts=ball.counts, other_counts=bar.counts)
-    with pytest.raises(InputError, match=r"finger 1 moves by \d+ counts only, and finger 0 by \d+: are the fingers swapped"):
+    with pytest.raises(InputError, match=r"finger 1 changes by \d+ counts only, and finger 0 by \d+: are the fingers swapped"):
         experiment(bench.recording(BAR, (0, 0, 0)), BAR, finger=1)
 
 
@@ -158,7 +158,7 @@ def test_a_modulus_that_runs_to_the_end_of_its_range_is_not_believed(bench, expe
     problem = Problem(bench.presses, experiments[:1], ("modulus",))
     best = problem.linear(np.concatenate(problem.changes(problem.mean)))
     at_end = CalibrationResult(problem, problem.bounds[1].copy(), best, [], np.eye(1), [], 1.0, [])
-    with pytest.raises(InputError, match="asks for 2.00 times the moduli, the end of what is looked for; are the forces"):
+    with pytest.raises(InputError, match="fitted moduli are 2.00 times those of the materials, a bound of the fit; check that the forces"):
         check_result(at_end)
     check_result(replace(at_end, vector=problem.mean))
 
@@ -172,10 +172,10 @@ def test_a_held_weight_acts_while_the_counts_are_high():
 
 def test_a_recording_without_force_or_without_a_press_is_refused():
     counts = np.zeros((100, 1, 7, 4))
-    with pytest.raises(InputError, match="finger 0 moves by 0 counts only; record a press that it feels"):
+    with pytest.raises(InputError, match="finger 0 changes by 0 counts only; record a stronger press"):
         experiment(make_recording(np.arange(100) / 60, counts, source="x"), BALL)
     counts[50:] = 200
-    with pytest.raises(InputError, match="its force is not known; state a held weight's"):
+    with pytest.raises(InputError, match="its force is not known; state the force of a held weight"):
         experiment(make_recording(np.arange(100) / 60, counts, source="x"), BALL)
 
 
@@ -217,7 +217,7 @@ def test_a_thicker_cover_stands_further_out_of_the_same_shell(bench):
     assert thicker.cover.thickness_mm == pytest.approx(1.2 * spec.cover.thickness_mm)
     assert thicker.thickness_mm - thicker.edge.held_below_mm == pytest.approx(spec.thickness_mm - spec.edge.held_below_mm)
     low = spec.model_copy(update={"edge": type(spec.edge)(held={"sides_below_mm": 0.2})})
-    with pytest.raises(InputError, match="under a cover of 1.2 mm, .* its shell would stand 0.1 mm out of it"):
+    with pytest.raises(InputError, match="with a cover of 1.2 mm, .* its shell would be 0.1 mm higher than the cover"):
         with_cover(low, 0.8)
 
 

@@ -17,7 +17,7 @@ def scored(model, printed, compact, *, set_name="unseen", mean=0.5):
 
 def row(*, half, full, perfect, printed, compact, **changes):
     curves = pd.concat([curve("elastic", half, full), curve("reference", perfect, perfect)])
-    facts = {"own": "printed", "tested": ["elastic"], "reference": "reference", "source": "virtual sensor"} | changes
+    facts = {"architecture": "printed", "tested": ["elastic"], "reference": "reference", "source": "virtual sensor"} | changes
     return limits(curves, scored("elastic", printed, compact), **facts).iloc[0]
 
 

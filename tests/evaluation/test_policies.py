@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
-from softtact.evaluation.policies import choices, policy_table, press_table, told_over_true
+from softtact.evaluation.policies import choices, expected_over_true, policy_table, press_table
 from softtact.press.choice import INTERVALS
 
 FORCES = np.array([10.0, 20.0])
@@ -39,7 +39,7 @@ def test_a_press_counts_with_its_worst_load_step_and_the_time_of_all(table):
 
 
 def test_an_error_that_is_the_same_everywhere_is_found_exactly(table):
-    assert told_over_true(table, "foundation")["median"] == pytest.approx(1.0, rel=1e-6)
+    assert expected_over_true(table, "foundation")["median"] == pytest.approx(1.0, rel=1e-6)
 
 
 def test_the_error_to_expect_is_found_from_indenters_alone():

@@ -61,6 +61,6 @@ def test_forces_that_are_all_different_are_gathered_in_ranges():
 @pytest.mark.parametrize(("network", "begins"), [(0.4, "Not trained: the printed network of the elastic model"),
                                                  (0.6, "At 50 N on grasped objects the printed network")])
 def test_a_network_below_the_mean_reading_is_called_not_trained_first(network, begins):
-    said = verdicts(table(network), own="printed")
-    assert said[0].startswith(begins) and "gap_formula, has 0.600" in said[-1]
+    sentences = verdicts(table(network), architecture="printed")
+    assert sentences[0].startswith(begins) and "gap_formula, has 0.600" in sentences[-1]
     assert len(untrained(table(network))) == (network < 0.5)

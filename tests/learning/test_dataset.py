@@ -162,10 +162,10 @@ def mix_sources(study):
     (drop_press, "unseen/hexagon: there is no press with the model hyperelastic"),
     (drop_reading, "grasps/object_1: there is no reading"),
     (repeat_item, "form_1: it is in the sets indenters and unseen"),
-    (shift_forces, "indenters/form_1: the model elastic is pressed at 10, 20, 30 N and the sensor read at 10, 20, 35 N"),
+    (shift_forces, "indenters/form_1: the press with the model elastic is at 10, 20, 30 N and the reading at 10, 20, 35 N"),
     (spoil_map, "the press of unseen/hexagon with the model elastic: .* not finite"),
     (spoil_reading, "the reading of unseen/hexagon: .* not finite"),
-    (leak, "grasps/object_1: its deformation map at 10 N is that of the training indenter form_1"),
+    (leak, "grasps/object_1: its deformation map at 10 N equals one of the training indenter form_1"),
     (leave_nothing, "no load step is left for unseen"),
     (mix_sources, "published archive and virtual sensor; do not mix"),
 ])

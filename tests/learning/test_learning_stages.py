@@ -158,7 +158,7 @@ def test_both_architectures_stand_in_one_table_and_one_figure(finished):
     table = folder / "tables/networks.csv"
     outputs = {"networks": table, "verdicts": folder / "evaluation/verdicts.json",
                **{name: folder / f"tables/{name}.csv" for name in ("scores", "levels")}}
-    compare_networks.run(inputs={**files, **tests}, outputs=outputs, settings=settings_of("ssim", "seed", own="printed"))
+    compare_networks.run(inputs={**files, **tests}, outputs=outputs, settings=settings_of("ssim", "seed", architecture="printed"))
     rows, scores = pd.read_csv(table), pd.read_csv(outputs["scores"])
     assert scores.groupby(["model", "set", "force"]).size().unique().tolist() == [2 + 8 + 1]     # networks, baselines, the sensor
     assert rows.mean_reading_ssim.notna().all() and set(rows.remains) <= {"noise", "optimiser", "data", "network"}

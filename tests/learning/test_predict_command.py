@@ -93,7 +93,7 @@ def test_what_training_has_not_seen_is_predicted_with_a_warning(capsys, model, t
          "3 of 3 maps lie outside the training maps' range, 0.05 to 0.5 mm deep at most"),
         ({"normal_force_n": ("step", [10.0, 20.0, 50.0])},
          "1 of 3 maps lie outside the training maps' range, 5 to 40 N (the first with 50)"),
-        ({"within_validity": ("step", [1, 1, 0])}, "1 of 3 load steps are beyond what the press' model is valid for"),
+        ({"within_validity": ("step", [1, 1, 0])}, "1 of 3 load steps are outside the validity of the press' model"),
     ]:
         status, out, err = run(capsys, write_press(tmp_path / "far.nc", **changes), "--network", model, "--json")
         assert status == 0 and err.count("\n") == 1 and sentence in err, changes
@@ -119,7 +119,7 @@ def spoiled(values, kind):
 
 def test_a_file_that_holds_no_map_is_refused(capsys, model, tmp_path):
     for name, values, sentence in [
-        ("a.npy", bump(0).T, "its map has 33 x 57 values and the network takes 57 x 33 (y, x); it is transposed"),
+        ("a.npy", bump(0).T, "its map has 33 x 57 values and the network needs 57 x 33 (y, x); it is transposed"),
         ("a.npy", np.stack([bump(0)] * 2), "it holds 3-dimensional float64 values; give one map"),
         ("a.npy", spoiled(bump(0), np.nan), "it holds values that are not finite"),
         ("a.npy", np.array([{}], dtype=object), "not an array of numbers"),

@@ -74,7 +74,7 @@ def test_another_seed_draws_other_places_and_another_begun_data_set_is_refused(s
     assert np.array_equal(plan(sensor, meshes).poses, plan(sensor, meshes, presses=9).poses[:4])
     with press_data._opened(tmp_path / "a.h5.part", "a") as file:
         press_data._begin(file, plan(sensor, meshes, seed=4))
-    with pytest.raises(InputError, match="of other objects or settings is unfinished there; delete it, or give another name"):
+    with pytest.raises(InputError, match="there is an unfinished data set of other objects or settings; delete it, or give another name"):
         write_press_data(tmp_path / "a.h5", plan(sensor, meshes), workers=1, label="")
 
 
@@ -118,11 +118,11 @@ def test_the_command_writes_a_data_set_that_torch_batches(tmp_path, monkeypatch,
 
 
 @pytest.mark.parametrize(("more", "said"), [
-    ("--presses 0 --out d.h5", "0 presses holds nothing"), ("--presses 2 --out d.txt", "d.txt: the format hdf5 is written as .h5"),
+    ("--presses 0 --out d.h5", "0 presses is empty"), ("--presses 2 --out d.txt", "d.txt: the format hdf5 is written as .h5"),
     ("--presses 2 --format netcdf --out d.h5", "the format netcdf is written as .nc"),
     ("--presses 2 --force 70 --out d.h5", "--force 70: 70 N is out of the range"),
     ("--presses 2 --out none/d.h5", "there is no folder none"),
-    ("--presses 2 --out there.h5", "there is a whole data set already")])
+    ("--presses 2 --out there.h5", "there is already a finished data set")])
 def test_what_cannot_be_used_is_refused_and_leaves_nothing(more, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     trimesh.creation.box((8, 12, 5)).export("part.stl")

@@ -211,7 +211,7 @@ def test_what_cannot_be_pressed_is_refused_before_the_solver_starts(folder):
 
 
 @pytest.mark.parametrize(("options", "message"), [
-    (["--model", "elastic"], "--model elastic: the solid model alone presses"), (["--full-scale"], "without taxels"),
+    (["--model", "elastic"], "--model elastic: a sensor of kind solid, such as"), (["--full-scale"], "without taxels"),
     (["--tolerance", "0.02"], "--tolerance 0.02: it has no effect"), (["--mesh-quality", "fine"], "--mesh-quality fine: it")])
 def test_options_of_the_layered_models_are_refused(folder, options, message, capsys):
     assert main(["press", str(folder / "plate.stl"), "--unit", "mm", "--sensor", str(folder / "block.yaml"), "--force", "1",

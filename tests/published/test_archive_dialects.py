@@ -79,13 +79,13 @@ def refused(small, folder, names, said):
 
 
 @pytest.mark.parametrize(("names", "said"), [
-    ({"force": "time"}, "0 columns are named as a force where one is needed .* name the one of the normal force 'force'"),
+    ({"force": "time"}, "0 columns are named as a force where one is needed .* name the column of the normal force 'force'"),
     ({"force": "Fx"}, "0 columns are named as a force"),
     ({"tax3": "load"}, "2 columns are named as a force"),
     ({"force": "Force (kN)"}, "the column 'Force \\(kN\\)' is in kN; convert it to N"),
-    ({"tax3": "tax30"}, "'tax1' to 'tax28' do not tell the order of the columns"),
-    ({"tax3": "left"}, "do not tell the order of the columns"),
-    ({"tax3": "tax4"}, "do not tell the order of the columns")])
+    ({"tax3": "tax30"}, "'tax1' to 'tax28' do not give the order of the columns"),
+    ({"tax3": "left"}, "do not give the order of the columns"),
+    ({"tax3": "tax4"}, "do not give the order of the columns")])
 def test_names_that_do_not_tell_which_column_is_which_are_refused(small, folder, names, said):
     refused(small, folder, names, said)
 

@@ -131,12 +131,12 @@ def test_each_recording_of_an_item_is_a_trial_of_its_readings(files, tmp_path, c
 def test_readings_on_the_way_down_are_left_out_whole_and_told_where_a_recording_ends_before(files, tmp_path, capsys):
     data = run([files("whole", ramp()), files("held", ramp(end_n=30.0))], tmp_path / "key.nc")
     assert "unloading_tactile_map" not in data and data.sizes["trial"] == 2
-    assert f"grasps/key: no readings on the way down, for {tmp_path / 'held.csv'} ends above 5 N." in capsys.readouterr().err
+    assert f"grasps/key: no readings at falling forces, because {tmp_path / 'held.csv'} ends above 5 N." in capsys.readouterr().err
 
 
-def test_taxels_that_may_be_dead_are_told_and_taken_as_they_read(files, tmp_path, capsys):
+def test_taxels_that_may_be_dead_are_reported_and_used_as_recorded(files, tmp_path, capsys):
     data = run([files("worn", ramp(), dead=[(3, 1), (6, 3)])], tmp_path / "key.nc")
-    assert "taxel 13, 27 of finger 0 never changes while others do; it may be dead, and is taken as" in capsys.readouterr().err
+    assert "taxel 13, 27 of finger 0 never changes while others do; it may be dead, and is used as" in capsys.readouterr().err
     assert (data.tactile_map.values[..., 3, 1] == 7).all()
 
 

@@ -31,7 +31,7 @@ def test_titles_and_labels_cannot_end_the_script_or_add_tags():
 def test_arrays_that_do_not_fit_are_refused():
     for changed, said in [
         ({"values": np.zeros(3)}, "values (n,); these are"),
-        ({"triangles": [[0, 1, 4]]}, "triangles be made of them"),
+        ({"triangles": [[0, 1, 4]]}, "triangles must refer to them"),
         ({"points_mm": np.full((4, 3), np.nan)}, "must be finite"),
         ({"labels": ["a", "b"]}, "1 states and 2 labels"),
         ({"points_mm": np.zeros((2, 4, 3)), "values": np.zeros((3, 4))}, "2 states and its values 3"),

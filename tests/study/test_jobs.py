@@ -77,7 +77,7 @@ def test_a_run_that_failed_goes_on_where_it_stopped(study):
 
 
 def test_a_second_run_beside_one_at_work_is_refused(tmp_path):
-    with held(tmp_path), pytest.raises(InputError, match="another run of this study is at work"), held(tmp_path):
+    with held(tmp_path), pytest.raises(InputError, match="another run of this study is in progress"), held(tmp_path):
         pass
 
 

@@ -53,7 +53,7 @@ def test_recordings_that_do_not_fit_the_study_are_refused_with_what_to_do(entrie
     assert "there is no recording of unseen/ellipse, grasps/object_5; add one of each" in refusal(entries[:3])
     assert "did you mean 'unseen/ellipse'" in refusal([*entries, entries[3] | {"item": "unseen/elipse"}])
     assert "there is no file no/such.csv, of indenters/circle_m" in refusal([entries[0] | {"file": "no/such.csv"}, *entries[1:]])
-    assert "finger 0 of" in (said := refusal([*entries, entries[0] | {"item": ITEMS[1]}])) and "a recording is one press" in said
+    assert "finger 0 of" in (said := refusal([*entries, entries[0] | {"item": ITEMS[1]}])) and "a recording is of one press" in said
     assert "it is 'indenters'" in refusal([entries[0] | {"item": "indenters"}, *entries[1:]])
     assert "'recordings' are listed, and the source is 'generated'" in refusal([], data={"recordings": entries})
 

@@ -86,7 +86,7 @@ def test_a_mistake_is_named_with_its_remedy():
     for path, value, said in [
         ("forces_nn", [5], "there is no key 'forces_nn'; did you mean 'forces_n'?"),
         ("data.sorce", "published", "at 'data': there is no key 'sorce'; did you mean 'source'?"),
-        ("data", {"source": "published"}, "'unseen' is empty; name indenters of the archive that training must not see"),
+        ("data", {"source": "published"}, "'unseen' is empty; name indenters of the archive to leave out of the training"),
         ("data", {"source": "published", "unseen": ["a"], "folder": "no/such"}, "no/such: there is no such folder; put the"),
         ("models.hyperelastic.mesh.refinement", -1, "at 'models.hyperelastic.mesh.refinement' (it is -1)"),
         ("models.elastic.friction", {"object": 0.3}, "at 'models.elastic': a model of kind 'elastic' knows no friction"),

@@ -93,7 +93,7 @@ def test_a_second_run_beside_a_running_one_is_refused(tmp_path):
         os.killpg(run.pid, signal.SIGSTOP)         # at work, however long the second run takes to start
         refused = project.snakemake(check=False)
         assert refused.returncode != 0
-        assert "another run of this study is at work" in refused.stdout
+        assert "another run of this study is in progress" in refused.stdout
     finally:
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()

@@ -262,7 +262,7 @@ rule compare_networks:
         benchmark_of("compare_networks")
     params:
         files=files,
-        settings=as_settings(own=OWN, ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
+        settings=as_settings(architecture=OWN, ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     shell:
         run_stage("compare_networks")
 
@@ -360,7 +360,7 @@ if CURVES:
         params:
             files=files,
             settings=as_settings(
-                own=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
+                architecture=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
             ),
         shell:
             run_stage("find_limits")

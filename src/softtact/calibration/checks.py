@@ -1,12 +1,13 @@
-"""Whether recordings can be of the presses that they are stated to be of, checked before a fit; and which further press helps most.
+"""Checks before a fit that recordings are of the stated presses, and the further press that would help the calibration most.
 
-Each recording by itself is compared with the press at one common gain and zero, the object up to 1.5 mm beside its place. What then
-is not explained of the counts' variance is small for the right press: gains 20 % apart leave 4 %. A wrong one leaves more, and
-the same counts may fit clearly better turned round, from the other finger, or at a force in another unit.
+Each recording alone is compared with the simulated press at one common gain and zero, with the object up to 1.5 mm off its stated
+place. The share of the counts' variance that this leaves unexplained is small for the right press: gains that differ by 20 % leave
+4 %. For a wrong press it is larger, and the counts may fit much better turned round, from the other finger, or with the force
+in another unit.
 
-The best further press is D-optimal: of some candidates the one that most shrinks the volume of what is uncertain. Beside it is
-given the mean deviation of the gains afterwards, which A-optimal presses minimise (A. Atkinson, A. Donev, R. Tobias, Optimum
-Experimental Designs, 2007, ch. 10). The object is taken to lie exactly in its stated place.
+The best further press is D-optimal: among candidates it reduces the volume of the uncertainty most. The mean deviation of the
+gains after it is also reported, which A-optimal presses minimise (A. Atkinson, A. Donev, R. Tobias, Optimum Experimental
+Designs, 2007, ch. 10). The object is assumed to lie exactly in its stated place.
 """
 
 from collections.abc import Sequence
@@ -22,28 +23,31 @@ from softtact.errors import InputError
 from softtact.press.ladder import Ladder
 from softtact.readout.taxels import relative_change
 
-UNEXPLAINED = 0.1      # share of the variance, from which a recording is refused: gains 30 % apart, more than any sensor's
-_CLEARLY = 0.5         # of what is left, below which another reading of the same numbers is the better one
-_AT_BOUND = 0.01       # of ln modulus, or mm
-_PERFECT = 0.01        # what is left is so little that nothing is to be asked
-UNITS = {"kilograms-force": 9.80665, "pounds-force": 4.44822}     # forces of one unit in N
+UNEXPLAINED = 0.1      # unexplained share of the variance that refuses a recording: that of gains 30 % apart, beyond any sensor
+_CLEARLY = 0.5         # ratio of the unexplained shares below which another interpretation of the recording is better
+_AT_BOUND = 0.01       # distance from a bound that counts as at the bound, in ln modulus or mm
+_PERFECT = 0.01        # unexplained share below which no other interpretation is tried
+UNITS = {"kilograms-force": 9.80665, "pounds-force": 4.44822}     # one unit of force in N
 _OFF_MM = (-1.5, -0.75, 0.0, 0.75, 1.5)
 _BINS = 30
 _TURNS = {"its rows turned round": (-1, 1), "its columns turned round": (1, -1), "rows and columns turned round": (-1, -1)}
-_LEVELS = 4            # of a candidate's staircase
-_READINGS = 60.0       # at each: a second
+_LEVELS = 4            # load steps of a candidate press
+_READINGS = 60.0       # at each load step: one second
 
 
 @dataclass(frozen=True)
 class PressCheck:
-    """unexplained: share of the variance, at a common gain and zero;  turned: the least of it with rows or columns turned round."""
+    """How well the stated press explains a recording.
+
+    unexplained: share of the variance that a common gain and zero leave;  turned: the least share with rows or columns turned round
+    """
 
     unexplained: float
     turned: float
 
     @property
     def tells_orientation(self) -> bool:
-        """Whether the press would have shown rows or columns that are turned round."""
+        """Whether the press shows the orientation: turned round, the taxels would fit clearly worse."""
         return self.unexplained < _CLEARLY * self.turned
 
 
@@ -53,17 +57,17 @@ def check_recordings(problem: Problem) -> list[PressCheck]:
 
 
 def check_result(result: CalibrationResult) -> None:
-    """Raises InputError where a number ran to the end of its range: its value is then that of the limit."""
+    """Raises InputError if a fitted number is at a bound of its range."""
     problem = result.problem
     low, high = problem.bounds
     for name, value, least, most in zip(problem.names, result.vector, low, high, strict=True):
         if name == "ln modulus" and min(value - least, most - value) < _AT_BOUND:
-            raise InputError(f"The calibration asks for {result.modulus_scale:.2f} times the moduli, the end of what is "
-                             "looked for; are the forces in newtons, and the objects those that were pressed?")
+            raise InputError(f"The fitted moduli are {result.modulus_scale:.2f} times those of the materials, a bound of the "
+                             "fit; check that the forces are in newtons, and that the objects are those that were pressed.")
         if name.startswith(("x ", "y ")) and min(value - least, most - value) < _AT_BOUND:
             number = int(name.split()[1])
-            raise InputError(f"{problem.experiments[number - 1].name}: the object would lie {value:.1f} mm along {name[0]}, the "
-                             "end of what is looked for; state where it lay (--place).")
+            raise InputError(f"{problem.experiments[number - 1].name}: the object would lie {value:.1f} mm along {name[0]}, a "
+                             "bound of the fit; state where it lay (--place).")
 
 
 def _check(problem, k, one):
@@ -99,7 +103,7 @@ def _refuse_other_finger(one, predicted, bins, here):
 
 
 def _refuse_unit(problem, one, here):
-    """Refuse forces that are clearly better taken in another unit; forces that the sensor does not bear are refused before."""
+    """Refuse forces that fit clearly better in another unit."""
     top = problem.presses.reach(one.mesh, one.place, largest_n=max(UNITS.values()) * one.force_n.max())[1]
     ladder = problem.presses.ladder(one.mesh, one.place, largest_n=top)
     bins = np.unique(np.linspace(0, len(one.counts) - 1, _BINS).astype(int))
@@ -117,7 +121,7 @@ def _refuse_unit(problem, one, here):
 
 def _predicted(problem: Problem, one: Experiment, ladder: Ladder, moving: np.ndarray | None, bins: np.ndarray,
                times: float) -> np.ndarray:
-    """dC/C0 (place, b, row, column) without creep, at `times` the forces, for the object in and beside its place."""
+    """dC/C0 (place, b, row, column) without creep, at `times` the forces, with the object at its place and at offsets from it."""
     weights = (one.bins @ ladder.weights(times * one.force_n))[bins]
     places = [np.zeros(3)] if moving is None else [np.array([x, y, 0.0]) for x in _OFF_MM for y in _OFF_MM]
     spec = problem.presses.sensor.spec
@@ -126,7 +130,7 @@ def _predicted(problem: Problem, one: Experiment, ladder: Ladder, moving: np.nda
 
 
 def _unexplained(predicted, counts, usable):
-    """Least share of the variance of counts (b, row, column), over the places, that a common gain and zero leave."""
+    """Share of the variance of the counts (b, row, column) that a common gain and zero leave, the least over the places."""
     total = max(usable.sum(), 1e-30)
     y = counts - (usable * counts).sum() / total
     m = predicted - (usable * predicted).sum(axis=(1, 2, 3), keepdims=True) / total
@@ -138,7 +142,7 @@ def _unexplained(predicted, counts, usable):
 
 @dataclass(frozen=True)
 class Candidate:
-    """A press that could be recorded: the object (mm) and its place x, y in mm, angle in degrees."""
+    """A press that could be recorded: an object (mm) and its place x, y in mm, angle in degrees."""
 
     name: str
     mesh: trimesh.Trimesh
@@ -147,8 +151,10 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Advice:
-    """What a candidate would add. information: growth of half the logarithm of the information's determinant, in nats;
-    gain_deviation: mean over the taxels, of the common gain, that would be left;  largest_n: the force to press up to
+    """The benefit of a candidate press.
+
+    information: increase of half the logarithm of the determinant of the information matrix, in nats
+    gain_deviation: remaining standard deviation of a gain over the common gain, mean over the taxels;  largest_n: largest force
     """
 
     candidate: Candidate
@@ -158,14 +164,14 @@ class Advice:
 
 
 def quarters(name: str, mesh: trimesh.Trimesh, footprint_mm: Sequence[float]) -> list[Candidate]:
-    """An object in the sensor's middle and in the middles of its quarters."""
+    """Candidates of an object at the centre of the sensor and at the centres of its quarters."""
     x, y = (0.25 * side for side in footprint_mm)
     places = [(0.0, 0.0), (-x, -y), (x, -y), (-x, y), (x, y)]
     return [Candidate(name, mesh, (px, py, 0.0)) for px, py in places]
 
 
 def rank(result: CalibrationResult, candidates: Sequence[Candidate], *, largest_n: float) -> list[Advice]:
-    """An `Advice` for each candidate pressed up to a force (N), as far as the model is valid; the most informative first."""
+    """An `Advice` for each candidate pressed up to a force (N) within the model's validity, the most informative first."""
     return sorted((_advice(result, one, largest_n) for one in candidates), key=lambda advice: -advice.information)
 
 
@@ -185,9 +191,9 @@ def _advice(result, candidate, largest_n):
     columns = {"ln scale": (result.linear.gain * m).reshape(-1, 1),
                "ln modulus": (result.linear.gain * (change(forces * np.exp(-step)) - m) / step).reshape(-1, 1),
                "gain": result.linear.scale * m.reshape(-1, 1) * each, "zero": each}
-    own = [name for name in ("ln modulus", "ln scale") if name in names] + ["gain", "zero"]
+    kinds = [name for name in ("ln modulus", "ln scale") if name in names] + ["gain", "zero"]
     noise = np.mean([one.noise_counts for one in problem.experiments]) * max(result.misfit, 1.0)
-    jacobian = np.hstack([columns[name] for name in own]) / max(noise, np.sqrt(1 / 12)) * np.sqrt(_READINGS)
+    jacobian = np.hstack([columns[name] for name in kinds]) / max(noise, np.sqrt(1 / 12)) * np.sqrt(_READINGS)
     before = result.covariance[np.ix_(keep, keep)]
     after = np.linalg.inv(np.linalg.inv(before) + jacobian.T @ jacobian)
     growth = 0.5 * (np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1])

@@ -1,4 +1,4 @@
-"""One recording of a known press, as the fit takes it: readings averaged over time, the forces behind them, the object's place."""
+"""One recording of a known press, prepared for the fit: readings averaged over time, the forces, the object's place."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,10 +12,10 @@ from softtact.readout.recording import clipped, dead
 if TYPE_CHECKING:
     import xarray
 
-_SAMPLES, _BINS = 400, 100      # of a recording, over which creep is followed, and of which the counts are compared
-_ONSET = 0.5                     # of a held weight's largest sum of counts: it lies on the sensor from there on
-_OF_MEDIAN = 1.4826              # a normal number's standard deviation over the median of its absolute value
-_LEAST_COUNTS = 30.0             # over the noise, that a finger must move by to be pressed at all
+_SAMPLES, _BINS = 400, 100      # most samples of a recording for its creep, most intervals for the comparison of counts
+_ONSET = 0.5                     # of the largest sum of counts, above which a held weight lies on the sensor
+_OF_MEDIAN = 1.4826              # standard deviation over median absolute value of a normal distribution
+_LEAST_COUNTS = 30.0             # least change over the noise of a pressed finger
 
 
 @dataclass(frozen=True)
@@ -23,15 +23,15 @@ class Experiment:
     """A recording of one press on one finger; `bins` (b, n) averages n samples over b intervals of time."""
 
     name: str
-    """Of the recording's file."""
+    """Name of the recording's file."""
     mesh: trimesh.Trimesh
     """The object in mm; it is pressed with its lowest side down, the middle of its bounding box over `place`."""
     place: tuple[float, float, float]
     """Where the object was put: x, y in mm, angle about z in degrees."""
     time_s: np.ndarray
-    """(n,) of the samples, in s."""
+    """(n,) times of the samples, in s."""
     force_n: np.ndarray
-    """(n,) at the samples, in N."""
+    """(n,) forces at the samples, in N."""
     bins: np.ndarray
     """(b, n) weights of the means over intervals of time."""
     counts: np.ndarray
@@ -41,9 +41,9 @@ class Experiment:
     noise_counts: float
     """Standard deviation of one reading, from the differences of readings that follow each other."""
     readings_a_bin: float
-    """How many readings a mean is of."""
+    """Number of readings in a mean."""
     other_counts: np.ndarray | None = None
-    """(b, row, column) of the other finger, to notice that fingers are swapped; None where there is none."""
+    """(b, row, column) means of the other finger, to detect swapped fingers; None without one."""
 
     @property
     def force_of_bins(self) -> np.ndarray:
@@ -52,17 +52,17 @@ class Experiment:
 
     @property
     def deviation_counts(self) -> float:
-        """Standard deviation of a mean, which rounding to whole counts limits from below."""
+        """Standard deviation of a mean, including the rounding to whole counts."""
         return float(np.hypot(self.noise_counts, np.sqrt(1 / 12)) / np.sqrt(self.readings_a_bin))
 
 
 def experiment(recording: "xarray.Dataset", mesh: trimesh.Trimesh, *, finger: int = 0, force_n: float | None = None,
                place: tuple[float, float, float] = (0.0, 0.0, 0.0), largest_counts: float | None = None) -> Experiment:
-    """The `Experiment` of a recording and the object (mm) that one of its fingers was pressed with.
+    """The `Experiment` of a recording in which an object (mm) was pressed on one finger.
 
-    force_n: of a weight that was laid on and held: it acts while the finger's counts are above half of their largest sum. Without
-    it the recording's `force_n` is taken (`recording.with_force`).  largest_counts: at which the readout ends
-    Raises InputError where the finger is not pressed, its force is not known, or nothing of the recording is at rest.
+    force_n: force of a weight that was put on and held; it acts while the sum of the finger's counts is above half its maximum.
+    By default the recording's `force_n` is used (`recording.with_force`).  largest_counts: at which the readout saturates
+    Raises InputError if the finger is not pressed, or its force is not known.
     """
     name = recording.attrs["file"] or "the recording"
     if finger not in range(recording.sizes["finger"]):
@@ -72,7 +72,7 @@ def experiment(recording: "xarray.Dataset", mesh: trimesh.Trimesh, *, finger: in
     _check_pressed(name, recording, finger, noise)
     force = _held(counts, force_n) if force_n is not None else _known_force(name, recording, finger)
     if not (force.max() > 0 and np.isfinite(force).all()):
-        raise InputError(f"{name}: its largest force is {force.max():g} N; a calibration needs presses of known force above 0.")
+        raise InputError(f"{name}: its largest force is {force.max():g} N; a calibration needs presses with known forces above 0.")
     coarse = _means(len(counts), _SAMPLES)
     bins = _means(len(coarse), _BINS)
     both = bins @ coarse
@@ -87,7 +87,7 @@ def experiment(recording: "xarray.Dataset", mesh: trimesh.Trimesh, *, finger: in
 
 
 def _means(count, most):
-    """Weights (m, count), m at most `most`, of the means over equal numbers of neighbours; the last ones may be fewer."""
+    """Weights (m, count), m at most `most`, of means over equal numbers of neighbours; the last mean may have fewer."""
     each = -(-count // most)
     part = np.arange(count) // each
     weights = (part == np.arange(part[-1] + 1)[:, None]).astype(float)
@@ -95,7 +95,7 @@ def _means(count, most):
 
 
 def _noise(counts):
-    """Standard deviation of a reading: from the median step between readings, so that the steps of a press do not count."""
+    """Standard deviation of a reading, from the median difference of successive readings: load steps do not affect it."""
     if len(counts) < 3:
         return 0.0
     return float(np.median(_OF_MEDIAN * np.median(np.abs(np.diff(counts, axis=0)), axis=0)) / np.sqrt(2))
@@ -107,13 +107,13 @@ def _check_pressed(name, recording, finger, noise):
     if moved[finger] >= least:
         return
     pressed = [str(one) for one, distance in enumerate(moved) if distance >= least]
-    raise InputError(f"{name}: finger {finger} moves by {moved[finger]:.0f} counts only"
+    raise InputError(f"{name}: finger {finger} changes by {moved[finger]:.0f} counts only"
                      + (f", and finger {pressed[0]} by {moved[int(pressed[0])]:.0f}: are the fingers swapped? Calibrate finger "
-                        f"{pressed[0]} (--finger {pressed[0]})." if pressed else "; record a press that it feels."))
+                        f"{pressed[0]} (--finger {pressed[0]})." if pressed else "; record a stronger press."))
 
 
 def _held(counts, force_n):
-    """Force (n,) of a weight that lies on the sensor while its counts are high."""
+    """Force (n,) of a held weight, which acts while the counts are high."""
     total = counts.sum(axis=(1, 2))
     rest = np.quantile(total, 0.02)
     return np.where(total - rest > _ONSET * (np.quantile(total, 0.98) - rest), force_n, 0.0)
@@ -121,6 +121,6 @@ def _held(counts, force_n):
 
 def _known_force(name, recording, finger):
     if "force_n" not in recording:
-        raise InputError(f"{name}: its force is not known; state a held weight's (force_n, --force N), or give a log of forces "
-                         "(--force FILE.csv).")
+        raise InputError(f"{name}: its force is not known; state the force of a held weight (force_n, --force N), or give a log of "
+                         "forces (--force FILE.csv).")
     return recording.force_n.values[:, finger]

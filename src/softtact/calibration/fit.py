@@ -1,7 +1,7 @@
-"""From experiments to a calibrated sensor: best unknowns, covariance, what the presses do not determine; and the sensor's file.
+"""Fit a sensor's unknowns to experiments, with their covariance and what the presses do not determine; write the sensor's file.
 
-The file is a copy of that of the sensor with a block `calibration`, which `load_sensor` reads. A calibration by the hyperelastic
-model would take too long, so it is only compared with the calibrated sensor.
+The file is a copy of the sensor's file with a block `calibration`, which `load_sensor` reads. A calibration with the hyperelastic
+model would take too long, so that model is only compared with the calibrated sensor.
 """
 
 from collections.abc import Sequence
@@ -23,36 +23,36 @@ from softtact.sensors.base import read_mapping
 from softtact.sensors.fields import CalibrationBlock, SidesBelow
 from softtact.sensors.specification import spec_from_dict
 
-_ROUNDS, _SETTLED = 6, 0.5       # of pressing anew, until that changes counts by less than half of a mean's noise
-_UNKNOWN = 0.5                   # of the prior's standard deviation: what is left above it, the presses do not determine
-_PARTS = 0.35                    # of a direction's length: what is named as a part of it
+_ROUNDS, _SETTLED = 6, 0.5       # rounds of new presses at the fitted places, and the change of counts over noise that ends them
+_UNKNOWN = 0.5                   # of the prior's standard deviation; with more left, the presses do not determine an unknown
+_PARTS = 0.35                    # least component of a unit vector for which an unknown is named
 _HEAD = "# Made by `softtact calibrate` from {source}. Counts: gain x counts_per_relative_change x dC/C0 + zero_counts.\n"
 
 
 @dataclass(frozen=True)
 class CalibrationResult:
-    """What a calibration found."""
+    """The result of a calibration."""
 
     problem: Problem
     """Experiments and unknowns."""
     vector: np.ndarray
-    """(p,) unknowns by `problem.names`."""
+    """(p,) fitted unknowns in the order of `problem.names`."""
     linear: Linear
     """Common scale, gains and zeros."""
     counts: list[np.ndarray]
     """Predicted (b, row, column) of each experiment."""
     covariance: np.ndarray
-    """(q, q) of `names`, with the priors; the misfit beyond noise is counted as noise."""
+    """(q, q) covariance of `names`, with the priors; a misfit beyond the noise counts as noise."""
     names: list[str]
     """(q,) `problem.names`, `ln scale`, `gain 0` to the last taxel's, `zero 0` to the last taxel's."""
     misfit: float
-    """Root mean square of the misfits over their noise: 1 where the model explains all but noise."""
+    """Root mean square of the misfits over their noise: 1 if the model explains all but the noise."""
     not_identifiable: list[str]
-    """Sentences on what these presses do not determine; empty where they determine all."""
+    """Sentences on unknowns that these presses do not determine; empty if they determine all."""
 
     @property
     def modulus_scale(self) -> float:
-        """Of all moduli, over those of the materials' files; 1 where it was not fitted."""
+        """Moduli over those of the materials' files; 1 if not fitted."""
         return float(np.exp(self.problem.value(self.vector, "ln modulus", 0.0)))
 
     def deviation(self, name: str) -> float:
@@ -61,11 +61,11 @@ class CalibrationResult:
 
     @property
     def gain_deviation(self) -> np.ndarray:
-        """(row, column) standard deviation of the gains over the common scale, that of the scale included."""
+        """(row, column) standard deviation of the gains over the common scale, including that of the scale."""
         k, s = self.names.index("gain 0"), self.names.index("ln scale")
         n, c = self.linear.gain.size, self.covariance
-        own = np.diag(c)[k:k + n] + c[s, s] + 2 * c[s, k:k + n]
-        return np.sqrt(own).reshape(self.linear.gain.shape)
+        variance = np.diag(c)[k:k + n] + c[s, s] + 2 * c[s, k:k + n]
+        return np.sqrt(variance).reshape(self.linear.gain.shape)
 
     @property
     def zero_deviation(self) -> np.ndarray:
@@ -74,7 +74,7 @@ class CalibrationResult:
         return np.sqrt(np.diag(self.covariance)[k:]).reshape(self.linear.zero.shape)
 
     def block(self) -> CalibrationBlock:
-        """The block of a sensor's file."""
+        """The block `calibration` of a sensor's file."""
         shares, times = self.problem.creep(self.vector)
         deviations = {name: float(f"{self.deviation(name):.3g}") for name in self.names if not name.startswith(("gain", "zero"))}
         deviations |= {"gain, mean": float(f"{self.gain_deviation.mean():.3g}"),
@@ -93,7 +93,7 @@ def _rounded(values, digits):
 
 
 def calibrate(problem: Problem, *, label: str = "calibration") -> CalibrationResult:
-    """Fit a `Problem`. Raises ConvergenceError where an object still moves after some rounds of pressing anew."""
+    """Fit a `Problem`. Raises ConvergenceError if new presses at the fitted places still change the counts after some rounds."""
     vector = problem.mean.copy()
     for number in range(1, _ROUNDS + 1):
         vector = _descend(problem, vector)
@@ -102,12 +102,12 @@ def calibrate(problem: Problem, *, label: str = "calibration") -> CalibrationRes
         _, inverse = problem.stacked()
         change = float(np.sqrt(((inverse * (_predicted(problem, vector) - before)) ** 2).sum() / (inverse > 0).sum()))
         if label:
-            announce(f"{label}: round {number}; pressing the objects where they lie now changed counts by {change:.2g} of noise")
+            announce(f"{label}: round {number}; new presses at the fitted places changed the counts by {change:.2g} of their noise")
         if change <= _SETTLED:
             break
     else:
-        raise ConvergenceError(f"The calibration is not settled after {_ROUNDS} rounds: pressing the objects where they lie still "
-                               f"changes counts by {change:.2g} of their noise; state more closely where they lie (--place).")
+        raise ConvergenceError(f"The calibration has not converged after {_ROUNDS} rounds: new presses at the fitted places still "
+                               f"change the counts by {change:.2g} of their noise; state the places more exactly (--place).")
     vector = _descend(problem, vector)
     return _result(problem, vector)
 
@@ -119,7 +119,7 @@ def _predicted(problem, vector):
 
 
 def _descend(problem, start):
-    """The least squares' vector from a start."""
+    """The vector of unknowns after the least-squares fit from a start."""
     if not len(start):
         return start
 
@@ -133,7 +133,7 @@ def _descend(problem, start):
 
 
 def _differences(function, vector, steps, highest):
-    """Forward differences (n, p) of a function (n,), backward ones at a bound."""
+    """Forward differences (n, p) of a function (n,); backward ones at an upper bound."""
     here = function(vector)
     columns = []
     for k, step in enumerate(steps):
@@ -164,11 +164,11 @@ def sensitivities(problem: Problem, vector: np.ndarray, best: Linear, change: np
                   inverse: np.ndarray) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Names (q,) of all unknowns, derivatives (n, q) of the predicted counts over their noise, and the priors' deviations (q,)."""
     taxels = best.gain.size
-    own = _differences(lambda moved: (best.gain * np.concatenate(problem.changes(moved))).ravel(), vector, problem.steps,
-                       problem.bounds[1]) if len(vector) else np.zeros((change.size, 0))
+    fitted = _differences(lambda moved: (best.gain * np.concatenate(problem.changes(moved))).ravel(), vector, problem.steps,
+                          problem.bounds[1]) if len(vector) else np.zeros((change.size, 0))
     at = np.tile(np.arange(taxels), len(change))
     each = (at[:, None] == np.arange(taxels)).astype(float)
-    columns = [own, (best.gain * change).reshape(-1, 1), best.scale * change.reshape(-1, 1) * each, each]
+    columns = [fitted, (best.gain * change).reshape(-1, 1), best.scale * change.reshape(-1, 1) * each, each]
     names = [*problem.names, "ln scale", *(f"gain {k}" for k in range(taxels)), *(f"zero {k}" for k in range(taxels))]
     p = problem.priors
     prior = np.concatenate([problem.deviation, [p.log_scale], np.full(taxels, p.gain), np.full(taxels, p.zero_counts)])
@@ -177,10 +177,10 @@ def sensitivities(problem: Problem, vector: np.ndarray, best: Linear, change: np
 
 def not_identifiable(names: Sequence[str], information: np.ndarray, covariance: np.ndarray, prior: np.ndarray,
                      shape: tuple[int, int]) -> list[str]:
-    """Sentences on unknowns that presses with this information (q, q) leave about as uncertain as they were before.
+    """Sentences on unknowns that presses with this information (q, q) leave about as uncertain as before.
 
-    A number by itself: more than half of its prior's deviation is left. Several together: a direction in which each of them is
-    known by others, but not all at once (an eigenvector of the information in units of the priors, with less than one of them).
+    One unknown: more than half of its prior's standard deviation is left. Several together: a combination that the presses do not
+    separate (an eigenvector of the information, in units of the priors, with an eigenvalue below one).
     """
     left = np.sqrt(np.diag(covariance)) / prior
     open_taxels = [int(name.split()[1]) for name, share in zip(names, left, strict=True)
@@ -194,7 +194,7 @@ def not_identifiable(names: Sequence[str], information: np.ndarray, covariance: 
             sentences.append(f"{in_words(name)}: {share:.0%} of what was uncertain before is left")
     keep = [k for k, name in enumerate(names) if not name.startswith(("gain ", "zero "))]
     inner = np.ix_(keep, keep)
-    # What is left of the information on these once gains and zeros are free, too: the inverse of their part of the covariance.
+    # Information on these with gains and zeros free: the inverse of their block of the covariance.
     scaled = np.linalg.inv(covariance[inner]) * np.outer(prior[keep], prior[keep]) - np.eye(len(keep))
     values, vectors = np.linalg.eigh(scaled)
     for value, vector in zip(values, vectors.T, strict=True):
@@ -205,7 +205,7 @@ def not_identifiable(names: Sequence[str], information: np.ndarray, covariance: 
 
 
 def in_words(name: str) -> str:
-    """An unknown's name as a message has it."""
+    """An unknown's name in words, for a message."""
     kind, _, number = name.rpartition(" ")
     words = {"share": "the share of creep", "ln time": "the time constant of creep", "x": "x of press", "y": "y of press",
              "angle": "the angle of press"}
@@ -215,7 +215,7 @@ def in_words(name: str) -> str:
 
 
 def write_calibrated(path: str | Path, sensor_file: str | Path, result: CalibrationResult) -> None:
-    """Write the sensor in `sensor_file` with what a calibration found; the file is checked before it takes its place."""
+    """Write a copy of `sensor_file` with the result of a calibration; the file is checked before it is put in place."""
     values = read_mapping(sensor_file)
     block = result.block()
     if "cover" in result.problem.names:
@@ -240,10 +240,10 @@ def _calibrated(value_mm, source):
 
 
 def hyperelastic_differences(result: CalibrationResult) -> list[float | None]:
-    """How far, in counts (root mean square), the hyperelastic model lies from the calibrated one at each press' largest force.
+    """Root mean square difference in counts between the hyperelastic and the calibrated model, at each press' largest valid force.
 
-    That is the largest for which the calibrated one is valid. Both have the calibrated gains, moduli, cover, friction and places,
-    and no creep. None where there is no valid force, or where the hyperelastic model does not reach it.
+    Both use the calibrated gains, moduli, cover, friction and places, without creep. None if no force is valid, or if the
+    hyperelastic model does not reach it.
     """
     return [_difference(result, k) for k in range(len(result.problem.experiments))]
 
@@ -255,7 +255,7 @@ def _difference(result, k):
     force = min(problem.valid_n[k], float(one.force_n.max()) / result.modulus_scale)
     if force == 0:
         return None
-    announce(f"{one.name}: pressing by the hyperelastic model at {force:.3g} N")
+    announce(f"{one.name}: pressing with the hyperelastic model at {force:.3g} N")
     friction, spec = problem.value(result.vector, "friction", 0.0), with_cover(sensor.spec, cover)
     if "friction" in problem.names:
         spec = with_friction(spec, friction)
@@ -265,9 +265,9 @@ def _difference(result, k):
     except ConvergenceError:
         return None
     shares = parabola(COVERS, cover) if "cover" in problem.names else {1.0: 1.0}
-    own = sum(share * problem.presses.ladder(one.mesh, place, largest_n=force, cover=variant).maps_mm[-1]
-              for variant, share in shares.items())
-    own = own + sum(share * np.tensordot(ladder.weights(np.array([force]))[0], ladder.maps_mm, 1)
-                    for share, ladder in problem.rubbed(k, friction))
-    apart = result.linear.gain * (relative_change(sensor.spec, other) - relative_change(sensor.spec, own))
+    fitted = sum(share * problem.presses.ladder(one.mesh, place, largest_n=force, cover=variant).maps_mm[-1]
+                 for variant, share in shares.items())
+    fitted = fitted + sum(share * np.tensordot(ladder.weights(np.array([force]))[0], ladder.maps_mm, 1)
+                          for share, ladder in problem.friction_changes(k, friction))
+    apart = result.linear.gain * (relative_change(sensor.spec, other) - relative_change(sensor.spec, fitted))
     return float(np.sqrt(np.mean(apart**2)))

@@ -1,12 +1,13 @@
-"""Presses that the fit starts from: maps at rising forces of an object in a place, and in places and sensors a little off.
+"""Presses for a calibration: maps at rising forces of an object at a place, and at slightly changed places and sensors.
 
-A press at any force is taken from a spline through these. Scaling all moduli by s divides all forces by s (equilibrium is linear in
-the stresses, and nothing else has the dimension of a stress), so that a softer sensor is the same one at a larger force.
+The map at any force is interpolated with a spline through these. Dividing all moduli by s divides all forces by s, because
+equilibrium is linear in the stresses and nothing else has the dimension of a stress. So a softer sensor at a force is the same
+sensor at a larger force.
 
-Friction changes a map by some per cent of its maximum, for where they touch the object keeps the cover from slipping outwards. It
-is computed by the hyperelastic model, because the fast models have none. Most points stick from a coefficient of 0.2 on, so that
-presses straight down hardly distinguish larger ones. A press with friction depends on its path, so that it takes as many load
-steps as the calibration's presses.
+Friction changes a map by some per cent of its maximum, because the object keeps the cover from sliding outwards. The hyperelastic
+model computes this change; the fast models have no friction. From a coefficient of 0.2 on most points stick, so that presses
+straight down hardly distinguish larger coefficients. A press with friction depends on its path, so it has as many load steps as
+the calibration's presses.
 """
 
 import warnings
@@ -26,14 +27,14 @@ from softtact.sensors.fields import SidesBelow
 from softtact.sensors.frusta import SensorSpec
 
 LEVELS = 9
-SOFTEST = 0.5            # modulus scale down to which forces are pressed
-REACH_LEVELS = 8         # of the first press, which only shows up to which force the model is valid
-COVERS = (0.8, 1.0, 1.25)     # of the cover's thickness, through which its effect is interpolated
-FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.6)     # coefficients of the object, between which its effect is interpolated
+SOFTEST = 0.5            # least modulus scale for which the presses reach the forces
+REACH_LEVELS = 8         # load steps of the first press, which only finds the largest valid force
+COVERS = (0.8, 1.0, 1.25)     # factors of the cover's thickness between which its effect is interpolated
+FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.6)     # coefficients of the object between which its effect is interpolated
 
 
 class _BeyondError(Exception):
-    """Ends a press beyond its model's validity; `result` holds it so far."""
+    """Ends a press at the first load step outside the model's validity; `result` holds the load steps."""
 
     def __init__(self, result):
         super().__init__()
@@ -42,7 +43,7 @@ class _BeyondError(Exception):
 
 @dataclass
 class Presses:
-    """The presses of a calibration, each made once. `model` is that of `Sensor.press`; `variants` of the sensor by its cover."""
+    """The presses of a calibration, each computed once. `model`: of `Sensor.press`; `variants`: sensors by factor of the cover."""
 
     sensor: Sensor
     model: str = "foundation"
@@ -53,7 +54,7 @@ class Presses:
     def ladder(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float, cover: float = 1.0) -> Ladder:
         """The `Ladder` of an object at a place (x, y in mm, degrees) up to a force in N.
 
-        cover: thickness of the cover over that of the sensor. Forces that the model does not reach are left out.
+        cover: factor of the sensor's cover thickness. Forces that the model does not reach are left out.
         """
         key = (id(mesh), *np.round(place, 6), round(largest_n, 6), cover)
         if key not in self.known:
@@ -62,9 +63,9 @@ class Presses:
         return self.known[key]
 
     def reach(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float) -> tuple[float, float]:
-        """Up to which force (N) the model is valid for an object at a place, in coarse steps, and the step after that.
+        """The largest of some coarse load steps (N) for which the model is valid for an object at a place, and the next load step.
 
-        Both are `largest_n` where it is valid so far. Beyond validity a press may take minutes, so it ends there.
+        Both are `largest_n` if it is valid. The press ends at the first invalid load step, because later ones can take minutes.
         """
         def stop(result: PressResult) -> None:
             if not result.within_validity[-1]:
@@ -88,7 +89,7 @@ class Presses:
                 return error.result
 
     def _sensor(self, cover, largest_n):
-        """The sensor with a cover of `cover` times its thickness, which bears so large a force (N): a softer one is asked for."""
+        """The sensor with `cover` times its cover thickness, and a permitted force of at least `largest_n` (N) for soft sensors."""
         if cover not in self.variants:
             self.variants[cover] = self.sensor if cover == 1.0 else replace(
                 self.sensor, spec=with_cover(self.sensor.spec, cover), prepared_models={})
@@ -98,7 +99,7 @@ class Presses:
 
 
 def placed_at(mesh: trimesh.Trimesh, place: Sequence[float]) -> trimesh.Trimesh:
-    """A copy of the mesh: the middle of its bounding box at x, y (mm), turned about z (degrees), its lowest point at 0."""
+    """A copy of the mesh, turned about z (degrees), with the middle of its bounding box at x, y (mm) and its lowest point at 0."""
     x, y, angle = place
     low, high = mesh.bounds
     placed = mesh.copy()
@@ -109,43 +110,43 @@ def placed_at(mesh: trimesh.Trimesh, place: Sequence[float]) -> trimesh.Trimesh:
 
 
 def with_cover(spec: SensorSpec, times: float) -> SensorSpec:
-    """A sensor with a cover of so many times its thickness, in the same shell: a thicker cover rises further out of it.
+    """A sensor whose cover has `times` its thickness, in the same shell: a thicker cover protrudes further.
 
-    Raises InputError where the shell would rise above a thinner one.
+    Raises InputError if the shell would protrude above a thinner cover.
     """
     thickness = times * spec.cover.thickness_mm
     update: dict[str, Any] = {"cover": spec.cover.model_copy(update={"thickness_mm": thickness})}
     if isinstance(spec.edge.held, SidesBelow):
         below = spec.edge.held.sides_below_mm + thickness - spec.cover.thickness_mm
         if below <= 0:
-            raise InputError(f"{spec.name}: under a cover of {thickness:.3g} mm, which 'cover' is fitted from, its shell would "
-                             f"stand {-below:.3g} mm out of it (edge.held.sides_below_mm); leave 'cover' out of --fit.")
+            raise InputError(f"{spec.name}: with a cover of {thickness:.3g} mm, which a fit of 'cover' needs, its shell would "
+                             f"be {-below:.3g} mm higher than the cover (edge.held.sides_below_mm); leave 'cover' out of --fit.")
         update["edge"] = spec.edge.model_copy(update={"held": SidesBelow(sides_below_mm=below)})
     return spec.model_copy(update=update)
 
 
 def uncalibrated(name_or_sensor: "str | Sensor") -> Sensor:
-    """A sensor without what an earlier calibration found of it."""
+    """A sensor that was not calibrated before; raises InputError for a calibrated one."""
     sensor = name_or_sensor if isinstance(name_or_sensor, Sensor) else load_sensor(name_or_sensor)
     if sensor.spec.calibration is not None:
-        raise InputError(f"The sensor {sensor.spec.name} is calibrated already; calibrate the file that it was made from.")
+        raise InputError(f"The sensor {sensor.spec.name} is already calibrated; calibrate the file that it was made from.")
     sensor.spec.need_frusta("a calibration", "give a sensor of kind frusta")
     return sensor
 
 
 def parabola(nodes: Sequence[float], at: float) -> Mapping[float, float]:
-    """{node: weight} of the parabola through values at three nodes, at a place between them."""
+    """{node: weight} of the values at three nodes in the parabola through them, at a position between them."""
     x = np.array(nodes)
     return {float(node): float(np.prod((at - np.delete(x, k)) / (node - np.delete(x, k)))) for k, node in enumerate(x)}
 
 
-def rubbing(sensor: Sensor, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float,
+def friction_ladders(sensor: Sensor, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float,
             name: str = "") -> dict[float, Ladder]:
     """{coefficient: `Ladder` of the maps' changes in mm against a press without friction} of an object at a place.
 
-    place: x, y in mm, degrees;  largest_n: up to which force; what one of the presses does not reach is left out
+    place: x, y in mm, degrees;  largest_n: largest force; forces that one of the presses does not reach are left out
     """
-    announce(f"{name or 'friction'}: pressing by the hyperelastic model with {len(FRICTIONS)} coefficients of friction")
+    announce(f"{name or 'friction'}: pressing with the hyperelastic model at {len(FRICTIONS)} coefficients of friction")
     with warnings.catch_warnings(action="ignore", category=ShellWarning):
         ladders = [_ladder(sensor, friction, mesh, place, largest_n) for friction in FRICTIONS]
     reached = min(len(ladder.force_n) for ladder in ladders)
@@ -155,15 +156,15 @@ def rubbing(sensor: Sensor, mesh: trimesh.Trimesh, place: Sequence[float], *, la
 
 
 def with_friction(spec: SensorSpec, friction: float) -> SensorSpec:
-    """A sensor on whose cover the object has this coefficient of friction."""
+    """A sensor with this coefficient of friction between the object and its cover."""
     return spec.model_copy(update={"friction": spec.friction.model_copy(update={"object": friction})})
 
 
 def _ladder(sensor, friction, mesh, place, largest_n):
-    rubbed = replace(sensor, spec=with_friction(sensor.spec, friction), prepared_models={})
-    return Presses(rubbed, model="hyperelastic", levels=LEVELS).ladder(mesh, np.asarray(place, dtype=float), largest_n=largest_n)
+    rough = replace(sensor, spec=with_friction(sensor.spec, friction), prepared_models={})
+    return Presses(rough, model="hyperelastic", levels=LEVELS).ladder(mesh, np.asarray(place, dtype=float), largest_n=largest_n)
 
 
 def friction_weights(friction: float) -> Mapping[float, float]:
-    """{coefficient: weight} of what each changes, at a coefficient between them."""
+    """{coefficient: weight} of the changes at the nearest coefficients, for linear interpolation."""
     return {one: float(np.interp(friction, FRICTIONS, np.eye(len(FRICTIONS))[k])) for k, one in enumerate(FRICTIONS)}

@@ -1,12 +1,12 @@
-"""The unknowns of a calibration, and what the sensor would read for them.
+"""The unknowns of a calibration, and the readings that follow from them.
 
     counts = G (1 + e) dC/C0(map) + z               G common scale; e, z: each taxel's gain and zero
-    map = creep of the press' map at the force over the modulus scale, moved to where the object lies
+    map = creep of the press' map at the force over the modulus scale, moved to the object's place
 
 Gain and zero are linear and solved for within each step (variable projection; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
-413). The others are followed by Gauss and Newton's method. Moving and turning an object changes its maps by the differences to
-presses a little off, for what is bound to the sensor's edges does not move with it; `Problem.at` presses anew where the object has
-come to lie.
+413). The other unknowns are found with the Gauss-Newton method. The effect of moving and turning an object is the difference
+between presses at nearby places, because the sensor's edges do not move with the object; `Problem.at` makes new presses at the
+fitted places.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softtact.calibration.experiment import Experiment
-from softtact.calibration.ladder import COVERS, FRICTIONS, SOFTEST, Presses, friction_weights, parabola, rubbing
+from softtact.calibration.ladder import COVERS, FRICTIONS, SOFTEST, Presses, friction_ladders, friction_weights, parabola
 from softtact.errors import InputError
 from softtact.press.ladder import Ladder
 from softtact.readout.hysteresis import lagged
@@ -27,35 +27,35 @@ HARDEST = 1 / SOFTEST
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known before: standard deviations, so wide that a press which feels a number at all outweighs them. All assumed."""
+    """Standard deviations of the unknowns before a fit, all assumed and so wide that a press that depends on one outweighs it."""
 
     gain: float = 0.15
-    """Of a taxel over the common one: some times what is left after the maker's adjustment."""
+    """Of a taxel's gain over the common one: several times the scatter after the maker's adjustment."""
     zero_counts: float = 30.0
     """Of the zero over the recorder's baseline: five times the virtual sensor's noise."""
     log_scale: float = 3.0
-    """Of the common scale, whose order of magnitude alone is known."""
+    """Of the logarithm of the common scale, of which only the order of magnitude is known."""
     shares: tuple[float, ...] = (0.08, 0.06)
-    """Means of the shares that creep in late: the virtual sensor's."""
+    """Means of the shares of creep: the virtual sensor's."""
     share: float = 0.1
     """Of these shares."""
     times_s: tuple[float, ...] = (1.0, 10.0)
-    """Medians of the time constants: the virtual sensor's, from one hold to one press."""
+    """Medians of the time constants of creep: the virtual sensor's, from the duration of a hold to that of a press."""
     log_time: float = 0.7
     """Of the logarithm of a time constant: a factor of two."""
     log_modulus: float = 0.3
     """Of the logarithm of the modulus scale: batches of soft rubber differ by a third."""
     cover: float = 0.15
-    """Of the cover's thickness, as a share."""
+    """Of the cover's thickness, relative."""
     friction: tuple[float, float] = (0.2, 0.2)
-    """Mean and standard deviation of the object's coefficient on the cover."""
+    """Mean and standard deviation of the coefficient of friction between object and cover."""
     place_mm: float = 1.0
-    """Of where the object was put by hand."""
+    """Of the object's place along x and y, put by hand."""
     angle_deg: float = 3.0
-    """Of how it was turned."""
+    """Of its angle about z."""
 
 
-_OFF = (0.5, 0.5, 2.0)     # mm, mm and degrees, over which the maps' change with the place is taken: less than a step of the map
+_OFF = (0.5, 0.5, 2.0)     # mm, mm and degrees: differences of the place for the change of the maps, less than a step of the map
 
 # Kind: (step of the finite difference, lowest, highest); the last two about the prior's mean.
 _STEPS = {"share": (2e-3, -1.0, 0.4), "ln time": (0.02, -3.0, 3.0),
@@ -76,7 +76,7 @@ class Linear:
 
 @dataclass
 class Problem:
-    """Experiments on one sensor, and which of its numbers are unknown (some of FITTED, besides gain and zero)."""
+    """Experiments on one sensor, and the unknowns to fit (some of FITTED, besides gain and zero)."""
 
     presses: Presses
     experiments: Sequence[Experiment]
@@ -98,8 +98,8 @@ class Problem:
         self._usable = [one.usable & (one.force_of_bins <= valid)[:, None, None]
                         for one, valid in zip(self.experiments, self.valid_n, strict=True)]
         self._known: list[dict] = [{} for _ in self.experiments]
-        # Where the objects were put: what friction changes hardly depends on a millimetre.
-        self._rubbing = [rubbing(self.presses.sensor, one.mesh, one.place, largest_n=top, name=one.name)
+        # At the stated places, since the effect of friction hardly depends on a millimetre.
+        self._friction = [friction_ladders(self.presses.sensor, one.mesh, one.place, largest_n=top, name=one.name)
                          for one, top in zip(self.experiments, self._top, strict=True)] if "friction" in self.fitted else []
         self.at(self.mean)
 
@@ -114,7 +114,7 @@ class Problem:
                                  "give --model foundation.")
 
     def _unknowns(self):
-        """(name, mean, standard deviation) of each number that is fitted besides gains and zeros."""
+        """(name, mean, standard deviation) before the fit of each unknown besides gains and zeros."""
         p = self.priors
         if "relaxation" in self.fitted:
             for k, (share, time) in enumerate(zip(p.shares, p.times_s, strict=True), 1):
@@ -143,23 +143,23 @@ class Problem:
         return np.where([_kind(name) == "share" for name in self.names], 0.0, low), high
 
     def value(self, vector: np.ndarray, name: str, default: float) -> float:
-        """An unknown by its name, or the default where it is none."""
+        """The value of an unknown by its name, or the default if it is not fitted."""
         return float(vector[self.names.index(name)]) if name in self.names else default
 
     def place(self, vector: np.ndarray, k: int) -> tuple[float, float, float]:
-        """Where (x, y in mm, degrees) the object of experiment k, from 0, lies."""
+        """Place (x, y in mm, degrees) of the object of experiment k, from 0."""
         x, y, angle = (self.value(vector, f"{axis} {k + 1}", at)
                        for axis, at in zip(("x", "y", "angle"), self.experiments[k].place, strict=True))
         return x, y, angle
 
     def creep(self, vector: np.ndarray) -> tuple[list[float], list[float]]:
-        """Shares that creep in late, and their time constants in s; none where they are not fitted."""
+        """Shares of creep and their time constants in s; empty if they are not fitted."""
         terms = range(1, 1 + sum(_kind(name) == "share" for name in self.names))
         return ([self.value(vector, f"share {k}", 0.0) for k in terms],
                 [float(np.exp(self.value(vector, f"ln time {k}", 0.0))) for k in terms])
 
     def at(self, vector: np.ndarray) -> None:
-        """Press all objects where they lie now."""
+        """Compute the presses of all objects at their places in `vector`."""
         covers = COVERS if "cover" in self.fitted else (1.0,)
         self._places = [self.place(vector, k) for k in range(len(self.experiments))]
         self._ladders: list[dict[float, tuple[Ladder, np.ndarray | None]]] = []
@@ -172,7 +172,7 @@ class Problem:
             self._ladders.append(ladders)
 
     def _moving(self, one, place, k, ladder, cover):
-        """Change of the maps (3, l, y, x) by mm along x and y and by degree; None where the place is not fitted."""
+        """Change of the maps (3, l, y, x) per mm along x and y and per degree; None if the place is not fitted."""
         if "placement" not in self.fitted:
             return None
         changes = np.zeros((3, *ladder.maps_mm.shape))
@@ -182,13 +182,13 @@ class Problem:
             changes[axis, :count] = (moved.maps_mm[:count] - ladder.maps_mm[:count]) / step
         return changes
 
-    def rubbed(self, k: int, friction: float) -> list[tuple[float, Ladder]]:
-        """What friction of the object changes in experiment k, from 0: weights of ladders of maps; none where it is not fitted."""
+    def friction_changes(self, k: int, friction: float) -> list[tuple[float, Ladder]]:
+        """(weight, `Ladder` of changes of the maps) for friction in experiment k, from 0; empty if it is not fitted."""
         weights = friction_weights(friction)
-        return [(weights[one], ladder) for one, ladder in self._rubbing[k].items()] if self._rubbing else []
+        return [(weights[one], ladder) for one, ladder in self._friction[k].items()] if self._friction else []
 
     def at_place(self, k: int) -> tuple[Ladder, np.ndarray | None]:
-        """The presses of experiment k, from 0, where it was last pressed, and their change with the place (see `at`)."""
+        """The presses of experiment k, from 0, at its last computed place, and their change with the place (see `at`)."""
         return self._ladders[k][1.0]
 
     def changes(self, vector: np.ndarray) -> list[np.ndarray]:
@@ -200,7 +200,7 @@ class Problem:
                 for k in range(len(self.experiments))]
 
     def _change(self, k, key, shares, times):
-        """dC/C0 of one experiment, from what is known where its unknowns are the same."""
+        """dC/C0 of one experiment, cached while its unknowns stay the same."""
         if key not in self._known[k]:
             if len(self._known[k]) > 2 * len(self.names) + 4:
                 self._known[k].clear()
@@ -220,13 +220,13 @@ class Problem:
             ladder, moving = self._ladders[k][variant]
             pressed = ladder.maps_mm if moving is None else ladder.maps_mm + np.tensordot(off, moving, 1)
             maps = maps + share * binned(ladder, pressed)
-        for share, ladder in self.rubbed(k, friction):
+        for share, ladder in self.friction_changes(k, friction):
             maps = maps + share * binned(ladder, ladder.maps_mm)
         return relative_change(self.presses.sensor.spec, maps)
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
-        """Counts (n, row, column) of all experiments, and the inverse of their standard deviations, 0 where they are not usable:
-        of dead and clipped taxels, and at forces for which the model is not valid (`valid_n`).
+        """Counts (n, row, column) of all experiments, and the inverse of their standard deviations, which is 0 for dead and
+        clipped taxels and at forces above the model's validity (`valid_n`).
         """
         counts = np.concatenate([one.counts for one in self.experiments])
         inverse = np.concatenate([usable / one.deviation_counts
@@ -234,7 +234,7 @@ class Problem:
         return counts, inverse
 
     def linear(self, change: np.ndarray) -> Linear:
-        """The best `Linear` for dC/C0 (n, row, column): G by all taxels together, then each gain and zero with its prior."""
+        """The best `Linear` for dC/C0 (n, row, column): G from all taxels together, then each gain and zero with its prior."""
         counts, inverse = self.stacked()
         w = inverse**2
         total = np.maximum(w.sum(axis=0), 1e-30)
@@ -252,8 +252,8 @@ class Problem:
         change = np.concatenate(self.changes(vector))
         best = self.linear(change)
         misfit = inverse * (counts - best.gain * change - best.zero)
-        own = [(best.gain / best.scale - 1) / self.priors.gain, best.zero / self.priors.zero_counts]
-        return np.concatenate([misfit.ravel(), *(one.ravel() for one in own), (vector - self.mean) / self.deviation])
+        taxels = [(best.gain / best.scale - 1) / self.priors.gain, best.zero / self.priors.zero_counts]
+        return np.concatenate([misfit.ravel(), *(one.ravel() for one in taxels), (vector - self.mean) / self.deviation])
 
 
 def _kind(name):

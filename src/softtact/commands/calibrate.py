@@ -77,7 +77,7 @@ def _calibrate(options):
 
 
 def _checked(options):
-    """(recording, mesh, force, place) of each recording as stated; outputs that would overwrite an input are refused."""
+    """(recording, mesh, force, place) of each recording as stated. Raises InputError for outputs that would overwrite an input."""
     from softtact.files import refuse_overwriting
 
     check_folders(options.out, options.report)
@@ -91,7 +91,7 @@ def _checked(options):
 
 
 def _write(options, result, notes, advice):
-    """Write the calibrated sensor's file and, where asked for, the page; print the notes."""
+    """Write the calibrated sensor's file and, if requested, the page; print the notes."""
     from softtact.calibration.fit import write_calibrated
 
     write_calibrated(options.out, sensor_path(options.sensor), result)
@@ -104,7 +104,7 @@ def _write(options, result, notes, advice):
 
 
 def _for_each(name, values, count):
-    """One value for each recording, from as many values or from one for all."""
+    """One value for each recording; a single value applies to all."""
     values = values or ["0,0,0"]
     if len(values) not in (1, count):
         raise InputError(f"--{name} was given {len(values)} times for {count} recordings; give it once for all, or once for each.")
@@ -135,7 +135,7 @@ def _experiment(path, mesh, force, place, options, spec):
 
     recording = read_recording(path, baseline=options.baseline)
     if "counts" not in recording:
-        raise InputError(f"{path}: it holds the nodes of a simulation and no counts; give a recording of the sensor.")
+        raise InputError(f"{path}: it has nodes of a simulation but no counts; give a recording of the sensor.")
     held = float(force) if _is_number(force) else None
     if held is None:
         recording = with_force(recording, force)
@@ -150,7 +150,7 @@ def _experiment(path, mesh, force, place, options, spec):
 
 
 def _notes(problem, checks):
-    """Sentences on readings that are left out, and on what the recordings do not show."""
+    """Sentences on readings that are left out, and on an orientation that the recordings do not show."""
     for one, valid in zip(problem.experiments, problem.valid_n, strict=True):
         if one.force_of_bins.max() > valid:
             yield (f"{one.name}: readings above {valid:.3g} N are left out, for which the {problem.presses.model} model is not "

@@ -1,4 +1,4 @@
-"""Common parts of the commands: arguments, refusals before long work, and the printing of a result."""
+"""Common parts of the commands: arguments, checks before long work, and the printing of a result."""
 
 import argparse
 import json
@@ -29,7 +29,7 @@ EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, m
 
 def add_command(commands: argparse._SubParsersAction, name: str, run: Callable[[argparse.Namespace], None], summary: str,
                 examples: str, *, json: bool = True) -> argparse.ArgumentParser:
-    """A new command `name` that calls run(options), with examples in its help; `json` gives it the option --json."""
+    """Add a command `name` that calls run(options), with examples in its help; `json`: with the option --json."""
     command = commands.add_parser(name, help=summary, description=summary, epilog=f"examples:{examples.rstrip()}\n\n{EXIT_TEXT}",
                                   formatter_class=argparse.RawDescriptionHelpFormatter)
     command.set_defaults(run=run)
@@ -53,7 +53,7 @@ def add_mesh(command: argparse.ArgumentParser, *, several: bool = False) -> None
 
 
 def add_repair(command: argparse.ArgumentParser) -> None:
-    """The option to repair a mesh that is no clean body."""
+    """The option to repair a mesh that is not a clean body."""
     command.add_argument("--repair", action=argparse.BooleanOptionalAction, default=True,
                          help="repair clear faults of the mesh (flat or small holes, doubled, turned or broken facets, "
                               "overlapping bodies) and name each repair on stderr; --no-repair refuses such a mesh")
@@ -73,12 +73,12 @@ def read_object(options: argparse.Namespace, path: Path) -> "tuple[trimesh.Trime
 
 
 def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
-    """`result` as JSON, or the lines for people."""
+    """Print `result` as JSON, or the lines for people."""
     print(json.dumps(result, indent=2) if as_json else "\n".join(lines))
 
 
 def check_forces(forces: Iterable[float], spec: "Specification") -> None:
-    """Refuse a force out of the sensor's range, before a mesh is read or a solver loaded."""
+    """Refuse a force outside the sensor's range, before a mesh is read or a solver is imported."""
     low, high = spec.force_range_n
     for force in forces:
         if not low < force <= high:
@@ -87,7 +87,7 @@ def check_forces(forces: Iterable[float], spec: "Specification") -> None:
 
 
 def sensor_path(name: str) -> Path:
-    """The YAML file of a sensor, given by its name or by that file."""
+    """The YAML file of a sensor, from its name or its path."""
     from softtact.sensors.library import sensor_file
 
     return sensor_file(name)
@@ -109,16 +109,16 @@ def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
 
 
 def check_folders(*paths: Path | None) -> None:
-    """Refuse files that could not be written after a long press."""
+    """Refuse output files whose folder is missing or not writable, before a long press."""
     for path in paths:
         if path and not path.parent.is_dir():
-            raise InputError(f"{path}: there is no folder {path.parent}; make it first.")
+            raise InputError(f"{path}: there is no folder {path.parent}; create it first.")
         if path and not os.access(path.parent, os.W_OK):
-            raise InputError(f"{path}: the folder {path.parent} may not be written to; choose another.")
+            raise InputError(f"{path}: the folder {path.parent} is not writable; choose another.")
 
 
 def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:
-    """Refuse a file to write whose name has none of its known endings: {path or None: endings}."""
+    """Refuse an output file without one of its known endings: {path or None: endings}."""
     for path, known in endings.items():
         if path and path.suffix.lower() not in known:
             raise InputError(f"{path}: the file is written as {' or '.join(known)}; give a name with such an ending.")
@@ -132,13 +132,13 @@ def pairs(option: str, texts: Iterable[str] | None) -> Iterator[tuple[str, str]]
         if not (name and equals and value):
             raise InputError(f"{option} {text}: write it as NAME=VALUE.")
         if name in seen:
-            raise InputError(f"{option} {text}: {name} was given before, as {seen[name]}; give it once.")
+            raise InputError(f"{option} {text}: {name} was already given as {seen[name]}; give it once.")
         seen[name] = value
         yield name, value
 
 
 def numbers(option: str, text: str, count: int) -> list[float]:
-    """`count` numbers with colons between them."""
+    """`count` numbers, separated by colons."""
     try:
         values = [float(part) for part in text.split(":")]
     except ValueError:
@@ -150,19 +150,19 @@ def numbers(option: str, text: str, count: int) -> list[float]:
 
 
 def sensor_spec(name: str) -> "AnySpec":
-    """The description of a sensor by its name or its YAML file, without its solvers."""
+    """The specification of a sensor by its name or its YAML file, without its solvers."""
     from softtact.sensors.specification import read_spec
 
     return read_spec(sensor_path(name))
 
 
 def any_sensor_spec(name: str) -> Any:
-    """The description of a sensor of any kind, without its solvers."""
+    """The specification of a sensor of any kind, without its solvers."""
     from softtact.sensors.specification import read_any_spec
 
     return read_any_spec(sensor_path(name))
 
 
 def short(value: object) -> str:
-    """A number in four digits, anything else as it is."""
+    """A number with four digits, anything else unchanged."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

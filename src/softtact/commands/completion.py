@@ -1,4 +1,4 @@
-"""What completes a user's typing: `softtact completion` in a shell, `softtact config-schema` in an editor of YAML files."""
+"""`softtact completion` for completion in a shell, `softtact config-schema` for completion of YAML files in an editor."""
 
 import argparse
 import json

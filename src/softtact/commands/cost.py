@@ -1,4 +1,4 @@
-"""`softtact cost`: what a study takes before it is started."""
+"""`softtact cost`: the cost of a study before it starts."""
 
 import argparse
 import os
@@ -35,7 +35,7 @@ def _cost(options):
 
 
 def show_costs(opened: "OpenStudy", costs: "list[Cost]", *, cores: int, as_json: bool) -> None:
-    """Show what a study costs."""
+    """Print the cost of a study."""
     from dataclasses import asdict
 
     from softtact.studies.cost import cost_lines, origin_of, read_costs

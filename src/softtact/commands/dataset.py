@@ -75,12 +75,12 @@ def _meshes(options):
     names = [path.stem for path in paths]
     for name, path in zip(names, paths, strict=True):
         if names.count(name) > 1:
-            raise InputError(f"{path}: two objects have the name {name}; rename one: the data set names its objects.")
+            raise InputError(f"{path}: two objects have the name {name}; rename one, since the data set names its objects.")
     return {name: read_object(options, path)[0] for name, path in zip(names, paths, strict=True)}
 
 
 def _cost(plan, left, costs, cores):
-    """What is left to press and how long it takes, in one sentence."""
+    """One sentence on the presses left and their time."""
     spec, times = plan.sensor.spec, costs["grasps"]["seconds"]
     bound = "at most " if plan.model == "auto" else ""
     minutes = left * plan.fingers * times["hyperelastic" if plan.model == "auto" else plan.model] / 60 / cores

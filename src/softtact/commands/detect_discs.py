@@ -49,7 +49,7 @@ def _detect_discs(options):
 
 
 def _pixel_mm(options):
-    """Side of a pixel in mm, as the user stated it."""
+    """Side of a pixel in mm, from the options."""
     calibration = (options.calibration_mm, options.calibration_px)
     if (options.pixel_mm is None) == (calibration == (None, None)) or (None in calibration and calibration != (None, None)):
         raise InputError("the scale is not clear; give either --pixel-mm, or both --calibration-mm and --calibration-px.")

@@ -1,4 +1,4 @@
-"""`softtact export-deck`: a press as another solver's input."""
+"""`softtact export-deck`: a press as an input file of another solver."""
 
 import argparse
 from pathlib import Path

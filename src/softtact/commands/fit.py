@@ -1,4 +1,4 @@
-"""`softtact fit`: test curves to a material card."""
+"""`softtact fit`: a material card from test curves."""
 
 import argparse
 import sys
@@ -76,7 +76,7 @@ def _fit(options):
 
 
 def _material(options):
-    """The `MaterialConfig` of a material's YAML, if the argument means one; None for files of curves."""
+    """The `MaterialConfig` of a material's YAML, if the argument is one; None for files of curves."""
     from softtact.materials.config import load_material
     from softtact.sensors.library import YAML, known_names, material_file
 
@@ -89,7 +89,7 @@ def _material(options):
 
 
 def _inputs(options, config):
-    """The files that are read."""
+    """The input files."""
     from softtact.materials.readers import stated_files
     from softtact.sensors.library import material_file
 
@@ -103,13 +103,13 @@ _READING: dict[str, Any] = {"mode": None, "layout": "plain", "columns": {}, "sor
 
 
 def _reading(options):
-    """How the files are read, as `read_curves` takes it."""
+    """The arguments of `read_curves`."""
     return {name: getattr(options, name) for name in _READING if name != "columns"} | {
         "columns": dict(pairs("--column", options.column))}
 
 
 def _refuse_idle(options, curves, settings):
-    """Refuse an option that would change nothing, for want of the curve or of the constant that it acts on."""
+    """Refuse an option without effect, because the curve or constant that it acts on is missing."""
     volumetric = any(curve.mode == "volumetric" for curve in curves)
     if options.bulk_over_shear is not None and volumetric:
         raise InputError(f"--bulk-over-shear {options.bulk_over_shear:g}: it has no effect beside a volumetric curve, which gives "
@@ -120,7 +120,7 @@ def _refuse_idle(options, curves, settings):
 
 
 def _fit_settings(options):
-    """What the command line says of the fit, as `make_card` takes it."""
+    """The settings of `make_card` on the command line."""
     stated = {name: getattr(options, name) for name in ("choose", "material", "poisson", "bulk_over_shear", "residual",
                                                         "nonnegative", "small_strain")}
     stated["laws"] = options.law if options.law in (None, "all") else options.law.split(",")
@@ -143,6 +143,6 @@ def _fit_lines(card):
 
 
 def _left_out(law):
-    """The worst relative error on a mode that the law did not see."""
+    """The largest relative error on a mode that was left out of the fit."""
     errors = [entry["relative_error"] if entry else float("inf") for entry in law["left_out"].values()]
     return f"{max(errors):.0%}" if errors else "-"

@@ -24,7 +24,7 @@ EXAMPLES = """
 """
 _OF_GRASP = {"unit": None, "force": None, "x": 0.0, "y": 0.0, "angle": 0.0, "mass": None, "scene": None, "lift": True,
              "model": "auto", "policy": "error", "tolerance": 0.01, "sensor": "coro",
-             "shear": False}     # a replay takes these from its file
+             "shear": False}     # read from the file in a replay
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -64,7 +64,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _grasp(options):
     from softtact.robot.settings import import_mujoco
 
-    import_mujoco()     # says at once which extra is missing
+    import_mujoco()     # reports a missing extra at once
     from softtact.robot.events import write_events
 
     if options.out.is_file():
@@ -79,7 +79,7 @@ def _grasp(options):
 
 
 def _new(options):
-    """(data set, scene, record) of a grasp."""
+    """(data set, scene, record) of a new grasp."""
     from softtact.robot.grasp import GraspRun
     from softtact.robot.scene import Placement, build_scene
     from softtact.robot.settings import load_scene
@@ -151,7 +151,7 @@ def _digest(path):
 
 
 def _pictures(options, data, scene, record):
-    """Paths of the pictures that are written."""
+    """Draw the pictures; return their paths."""
     from softtact.robot.render import WHOLE, draw_grasp, draw_rows, write_video
 
     written = []
@@ -169,7 +169,7 @@ def _pictures(options, data, scene, record):
 
 
 def _summary(data):
-    """What a grasp gave, event by event, as plain JSON values."""
+    """The results of a grasp for each event, as plain JSON values."""
     rows = data.event_row.values
     events = [{"event": str(data.event.values[k]), "time_s": float(data.time_s[row]), "opening_mm": float(data.opening_mm[row]),
                "force_n": data.force_n[row].values.tolist(), "contact": data.contact[row].values.tolist(),

@@ -1,6 +1,6 @@
 """Commands on a mesh file: `softtact mesh`, a body for the solid model, and `softtact complexity`, the counts of the paper's rule.
 
-A body is made of tetrahedra in a closed surface, or of the elements of another program.
+A body consists of tetrahedra in a closed surface, or of the elements of another program.
 """
 
 import argparse
@@ -35,7 +35,7 @@ COMPLEXITY_EXAMPLES = """
 """
 _SURFACES = (".stl", ".obj", ".ply")
 _UNKNOWNS = 4.5                # for each element: measured 4.4 to 5.2
-_SECONDS = (0.5e-3, 2e-3)      # for each element, on one processor of 2023 with and without other work on it
+_SECONDS = (0.5e-3, 2e-3)      # for each element, on one processor of 2023, idle and with other work
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -98,7 +98,7 @@ def _mesh(options):
 
 
 def _filled(options, rules):
-    """The mesh of a surface, and the values that are reported of it."""
+    """The mesh of a surface, and the values to report."""
     from softtact.fem.body_mesh import MOST_ELEMENTS, body_report, mesh_body
     from softtact.fem.mesh_files import face_rule, with_named_faces
     from softtact.geometry.tetrahedra import estimated_elements
@@ -110,7 +110,7 @@ def _filled(options, rules):
     if options.size is None:
         raise InputError(f"--size: {options.mesh} is a surface; give the edge length in mm that its elements shall have.")
     for rule in rules.values():
-        face_rule(rule)                 # refused now and not after minutes
+        face_rule(rule)                 # checks the rule before minutes of meshing
     surface, repairs = read_object(options, options.mesh)
     if options.size > 0:
         count = estimated_elements(surface, options.size)
@@ -125,7 +125,7 @@ def _filled(options, rules):
 
 
 def _taken(options, rules):
-    """The mesh of a file of elements, and the values that are reported of it."""
+    """The mesh of a file of elements, and the values to report."""
     from softtact.fem.mesh_files import read_mesh_file
 
     for name in ("size", "envelope", "most_elements"):

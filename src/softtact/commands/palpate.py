@@ -39,8 +39,8 @@ def _palpate(options):
 
 
 def _lines(summary):
-    for own in summary["slopes"]:
-        yield (f"{own['tissue']}, {own['scenario']}: trend line {own['line_n_mm']:.2f} N/mm, at rest {own['initial_n_mm']:.2f}, "
-               f"F/d {own['secant_least_n_mm']:.2f} to {own['secant_largest_n_mm']:.2f}")
+    for slope in summary["slopes"]:
+        yield (f"{slope['tissue']}, {slope['scenario']}: trend line {slope['line_n_mm']:.2f} N/mm, "
+               f"at rest {slope['initial_n_mm']:.2f}, F/d {slope['secant_least_n_mm']:.2f} to {slope['secant_largest_n_mm']:.2f}")
     for claim in summary["claims"]:
         yield f"{claim['verdict']}: {claim['claim']} ({claim['ours']})"

@@ -1,4 +1,4 @@
-"""`softtact predict`: the taxels that a trained network reads off deformation maps."""
+"""`softtact predict`: taxel counts from deformation maps with a trained network."""
 
 import argparse
 import sys
@@ -77,14 +77,14 @@ MOST = 8     # maps in one picture, evenly chosen
 
 
 def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> None:
-    """Draw `Maps` and counts (n, row, column) to PNG or SVG: a column for each map, in mm above, the counts below."""
+    """Draw `Maps` and counts (n, row, column) as PNG or SVG: a column for each map, with the map in mm above its counts."""
     from softtact.reporting.style import pyplot, save
 
     plt = pyplot()
     shown = [round(k * (len(counts) - 1) / max(1, min(MOST, len(counts)) - 1)) for k in range(min(MOST, len(counts)))]
     extent, unit = _extent(maps)
     figure, axes = plt.subplots(2, len(shown), figsize=(1.2 + 2.3 * len(shown), 7.2), squeeze=False, layout="constrained")
-    most = max(1.0, float(counts.max()))          # on the whole range of 2400 counts light presses would be dark
+    most = max(1.0, float(counts.max()))          # over the whole range of 2400 counts light presses would be dark
     low, high = min(0.0, float(maps.maps_mm.min())), float(maps.maps_mm.max())
     for column, k in enumerate(shown):
         image = axes[0, column].imshow(maps.maps_mm[k], origin="lower", extent=extent, vmin=low, vmax=high, cmap="viridis")
@@ -99,7 +99,7 @@ def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> Non
 
 
 def _extent(maps):
-    """Sides of a map: in mm where the file has the grid, else in numbers of points."""
+    """Extent of a map: in mm if the file has the grid, else in points."""
     if maps.x_mm is None or maps.y_mm is None:
         height, width = maps.maps_mm.shape[1:]
         return (0, width - 1, 0, height - 1), "points"

@@ -1,4 +1,4 @@
-"""`softtact press`: a mesh on a sensor of any kind, its maps or solids, and a summary."""
+"""`softtact press`: press a mesh on a sensor of any kind; maps or solids, and a summary."""
 
 import argparse
 import sys
@@ -84,7 +84,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _add_soft(command):
-    """The options of a soft object: its law, the size of its elements, and what holds it."""
+    """The options of a soft object: its law, the size of its elements, and its held part."""
     soft = command.add_argument_group("soft objects")
     soft.add_argument("--object-law", type=Path, metavar="CARD.json",
                       help="card of `softtact fit` of the object, which then bends as the sensor does (model solid)")
@@ -121,9 +121,9 @@ def _press(options):
 
 
 def _press_one(path, files, label="press", *, options, spec, pose, how, sensors):
-    """Summary of a mesh's press, whose files are written, and the error that ended it before its last load step or None.
+    """Press a mesh and write its files; return the summary, and the error that ended it before its last load step or None.
 
-    sensors: holds the sensor from the first press on, with what its models prepared
+    sensors: holds the sensor after the first press, with its prepared models
     """
     from dataclasses import replace
 
@@ -150,19 +150,19 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
     return _written(result, files, options), error
 
 
-# Options that have an effect on the hyperelastic model alone, on the laws that the elastic model has none of, or on the choice.
+# Options with an effect only on the hyperelastic model, on laws (which the elastic model has none of), or on the choice.
 _IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation", "solid"), "device": ("elastic", "foundation"),
          "policy": MODELS[1:], "tolerance": MODELS[1:]}
 _DEFAULTS = {"card": None, "mesh_quality": "default", "device": "cpu", "policy": "error", "tolerance": 0.01}
-_REMEDIES = {"mesh_quality": "give a finer mesh to the sensor's file"}     # of what has no effect on sensors without layers
+_REMEDIES = {"mesh_quality": "give a finer mesh to the sensor's file"}     # of options without effect on sensors without layers
 
 
 def _refuse_idle(options, spec):
-    """Refuse an option that would change nothing: on the sensor, in the model that is asked for, or for want of another option."""
+    """Refuse an option without effect: on this sensor, in the named model, or because another option is missing."""
     if not spec.has_layers:
         if options.model not in ("auto", "solid"):
-            raise InputError(f"--model {options.model}: the solid model alone presses {options.sensor}, a sensor of kind "
-                             f"{spec.kind}; leave it out.")
+            raise InputError(f"--model {options.model}: a sensor of kind {spec.kind}, such as {options.sensor}, is pressed "
+                             "only with the solid model; leave it out.")
         for name in ("policy", "tolerance", "mesh_quality"):
             if getattr(options, name) != _DEFAULTS[name]:
                 raise InputError(f"{_given(options, name)}: it has no effect on a sensor of kind {spec.kind}; "
@@ -185,7 +185,7 @@ def _given(options, name):
 
 
 def _check_soft(options, spec):
-    """Refuse options of a soft object that lack each other, or that the solid model does not know."""
+    """Refuse options of a soft object that are incomplete, or that the solid model does not have."""
     if options.object_law is None:
         if options.object_size is not None or options.object_held != _HELD:
             raise InputError("--object-size and --object-held have no effect on a rigid object; add --object-law CARD.json.")
@@ -193,7 +193,7 @@ def _check_soft(options, spec):
     if options.object_size is None:
         raise InputError(f"--object-law {options.object_law}: give --object-size MM, the length of the object's elements.")
     if options.model not in ("auto", "solid"):
-        raise InputError(f"--model {options.model}: a soft object is pressed by the solid model alone; leave it out.")
+        raise InputError(f"--model {options.model}: a soft object is pressed only with the solid model; leave it out.")
     for name in ("mesh_quality", "policy", *(["device"] if spec.has_layers else [])):
         if getattr(options, name) != _DEFAULTS[name]:
             raise InputError(f"{_given(options, name)}: it has no effect on a soft object; leave it out.")
@@ -226,7 +226,7 @@ def _how(options, spec):
 
 
 def _quality(options):
-    """The hyperelastic body's mesh and what counts as solved on it, by the names of `Sensor`."""
+    """Mesh and tolerances of the hyperelastic body, by the names of `Sensor`."""
     from softtact.models.hyperelastic.mesh_settings import PRESETS
 
     mesh, solver = PRESETS[options.mesh_quality]
@@ -234,7 +234,7 @@ def _quality(options):
 
 
 def _written(result, files, options):
-    """The summary of what a press gave, be it the load steps before one that was not reached; its files are written."""
+    """Write the files of a press, also of one that stopped at a load step; return its summary."""
     if files.out:
         result.write(files.out)
     if files.vtu:
@@ -251,7 +251,7 @@ def _written(result, files, options):
 
 
 def _cards(options, spec):
-    """{layer or region: Law} of the cards given on the command line."""
+    """{layer or region: Law} of the cards on the command line."""
     from softtact.materials.cards import law_from_card, load_card
 
     laws = {}
@@ -263,7 +263,7 @@ def _cards(options, spec):
 
 
 def _summary_on_layers(result):
-    """What a press gave at each load step, as plain JSON values."""
+    """The results of a press at each load step, as plain JSON values."""
     load_steps = {"normal_force_n": result.normal_force_n, "force_n": result.force_n, "indentation_mm": result.indentation_mm,
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2))}
@@ -280,7 +280,7 @@ def _summary_on_layers(result):
 
 
 def _summary_on_solids(result):
-    """What a press on a sensor of kind solid gave at each load step, as plain JSON values."""
+    """The results of a press on a sensor of kind solid at each load step, as plain JSON values."""
     import numpy as np
 
     values = {"load": result.load("object"), "way_mm": result.frame_way_mm[:, result.frames.index("object")],
@@ -293,7 +293,7 @@ def _summary_on_solids(result):
 
 
 def _or_none(values):
-    """Numbers as lists; what a model does not give, nan, as null: JSON has no nan."""
+    """Numbers as lists, with null for nan, which JSON does not have; nan marks values that a model does not compute."""
     if values.ndim > 1:
         return [_or_none(row) for row in values]
     return [None if value != value else value for value in values.tolist()]
@@ -312,7 +312,7 @@ def _lines_on_layers(summary):
 
 
 def _error_line(expected_um, interval):
-    """The error to expect of a fast model, with the interval that the true one lies in; the hyperelastic model is the measure."""
+    """The expected error of a fast model against the hyperelastic model, with an interval for the true error."""
     if interval is not None:
         low, high = (factor * expected_um for factor in interval)
         yield (f"error to expect against the hyperelastic model: {expected_um:.2g} um ({low:.2g} to {high:.2g}), root mean square "
@@ -320,7 +320,7 @@ def _error_line(expected_um, interval):
 
 
 def _quality_lines(summary):
-    """How well the load steps were solved, by the worst of them."""
+    """The quality of the solution, as the worst of the load steps."""
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
     if None not in summary["residual_n"]:
         yield f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N"
@@ -340,8 +340,8 @@ def _quality_lines(summary):
 def _lines_on_solids(summary):
     yield f"{'force x, y, z, N':>33}{'displacement x, y, z, mm':>33}{'most moved, mm':>16}{'pressure, MPa':>15}"
     names = ("load", "way_mm", "largest_displacement_mm", "largest_pressure_mpa")
-    for load, way, moved, pressure in zip(*(summary[name] for name in names), strict=True):
-        yield "".join(f"{value:11.3g}" for value in (*load[:3], *way)) + f"{moved:16.4f}{pressure:15.4g}"
+    for load, displacement, moved, pressure in zip(*(summary[name] for name in names), strict=True):
+        yield "".join(f"{value:11.3g}" for value in (*load[:3], *displacement)) + f"{moved:16.4f}{pressure:15.4g}"
     if summary["reading_points_mm"]:
         yield "readings at the last step:"
         yield f"{'point x, y, z, mm':>33}{'displacement x, y, z, mm':>33}{'pressure, MPa':>15}"

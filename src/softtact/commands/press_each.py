@@ -1,4 +1,4 @@
-"""`softtact press` of several meshes: one folder of results for each, a table at the end, and none lost to one that fails."""
+"""`softtact press` of several meshes: a folder of results for each and a table of all; one that fails does not stop the others."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -18,22 +18,22 @@ class Column:
     """A number of the table of all objects."""
 
     name: str
-    """In the table's file."""
+    """Its name in the table's file."""
     title: str
-    """Over the printed table."""
+    """Its heading in the printed table."""
     style: str
-    """How it is printed, width and digits."""
+    """Its format in the printed table: width and digits."""
     of: Callable[[dict[str, Any]], float]
-    """What it is of a summary: that of the last load step."""
+    """Its value at the last load step of a summary."""
 
 
 def last(key: str) -> Callable[[dict[str, Any]], float]:
-    """What a summary has under a key at its last load step."""
+    """A function that gives the value of a key at the last load step of a summary."""
     return lambda summary: float(summary[key][-1])
 
 
 def _counts(summary):
-    """Sum of the taxels' counts at the last load step; nan where there are none."""
+    """Sum of the taxels' counts at the last load step; nan without taxels."""
     return float(sum(map(sum, summary["tactile_map"][-1]))) if "tactile_map" in summary else float("nan")
 
 
@@ -53,7 +53,7 @@ ON_SOLIDS = (*(_force(axis, place) for place, axis in enumerate("xyz")),
 
 @dataclass(frozen=True)
 class Files:
-    """What a press writes."""
+    """The files that a press writes."""
 
     out: Path | None
     vtu: Path | None
@@ -67,10 +67,10 @@ def is_several(meshes: Sequence[Path]) -> bool:
 
 def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str, Any], BaseException | None]],
                columns: Sequence[Column] = ON_LAYERS) -> None:
-    """Press each object with press(path, files, label), which gives a summary and the error that ended it early or None.
+    """Press each object with press(path, files, label), which returns a summary and the error that ended it early or None.
 
-    columns: what the table of all objects shows beside their names, status and model
-    Raises the kind of error that the first failed one had, after all are done and the table is shown.
+    columns: of the table of all objects, besides their names, status and model
+    After all presses and the table, raises an error of the kind of the first failure.
     """
     objects, rows, folder = _named(options.mesh), [], _folder(options)
     try:
@@ -84,16 +84,16 @@ def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str,
                 raise error
     finally:
         if rows:
-            _tell(rows, folder, options, columns)
+            _show(rows, folder, options, columns)
     failed = [(row, error) for row, error in rows if error]
     if failed:
         kind = ConvergenceError if all(isinstance(error, ConvergenceError) for _, error in failed) else InputError
-        raise kind(f"{len(failed)} of {len(rows)} objects failed, {', '.join(row['object'] for row, _ in failed)}; what is wrong "
-                   "with each stands above and in the table; press these again.")
+        raise kind(f"{len(failed)} of {len(rows)} objects failed, {', '.join(row['object'] for row, _ in failed)}; the reasons "
+                   "are above and in the table; press these again.")
 
 
 def _named(meshes):
-    """{name of its folder: path} of all meshes, those of a folder in order of name."""
+    """{name of its results folder: path} of all meshes, those of a folder sorted by name."""
     paths: list[Path] = []
     for path in meshes:
         found = sorted(file for file in path.iterdir() if file.suffix.lower() in MESHES) if path.is_dir() else [path]
@@ -104,12 +104,12 @@ def _named(meshes):
     names = [path.name if stems.count(path.stem) > 1 else path.stem for path in paths]
     for name, path in zip(names, paths, strict=True):
         if names.count(name) > 1:
-            raise InputError(f"{path}: two objects have the file name {name}; rename one, for each gets a folder of that name.")
+            raise InputError(f"{path}: two objects have the file name {name}; rename one, because each gets a folder of that name.")
     return dict(zip(names, paths, strict=True))
 
 
 def _folder(options):
-    """The folder that all is written to."""
+    """The folder for all results."""
     if options.out is None:
         raise InputError("--out is missing: each of several objects gets a folder of results; give --out a folder for them.")
     if options.out.suffix.lower() == ".nc" or options.out.is_file():
@@ -123,11 +123,11 @@ def _folder(options):
 
 
 def _row(name, path, folder, options, press, columns):
-    """A row of the table, and the error of an object that failed or None; its files are written."""
+    """Press an object and write its files; return its row of the table, and its error or None."""
     files = Files(folder / "press.nc", *(given and folder / given for given in (options.vtu, options.plot)))
     for old in (files.out, files.vtu, files.plot):
         if old:
-            old.unlink(missing_ok=True)     # of an earlier run: they must not be taken for this one's
+            old.unlink(missing_ok=True)     # of an earlier run, so that they are not mistaken for new ones
     try:
         summary, error = press(path, files, label=name)
     except (SofttactError, KeyboardInterrupt) as stop:
@@ -140,8 +140,8 @@ def _names(columns):
     return ("object", "status", "model", *(column.name for column in columns), "message")
 
 
-def _tell(rows, folder, options, columns):
-    """Write the table of all objects and show it."""
+def _show(rows, folder, options, columns):
+    """Write and print the table of all objects."""
     import pandas as pd
 
     from softtact.files import write_csv

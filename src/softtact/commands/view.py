@@ -29,7 +29,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--force-log", type=Path, metavar="FILE.csv",
                          help="of a recording: the force over time, with columns time_s and force_n (or force_n_0, force_n_1)")
     command.add_argument("--baseline", choices=("auto", "subtracted", "kept"), default="auto",
-                         help="of a recording: how the recorder wrote it (default: told by the lowest readings)")
+                         help="of a recording: how the recorder wrote it (default: found from the lowest readings)")
     command.add_argument("--page", type=Path, metavar="FILE.html", help="write the page, and open nothing")
 
 
@@ -42,7 +42,7 @@ def _view(options):
     if options.result.suffix.lower() == ".csv":
         return _view_recording(options)
     if options.force_log or options.baseline != "auto":
-        raise InputError(f"{options.result}: --force-log and --baseline have an effect on the .csv of a recording only; leave them "
+        raise InputError(f"{options.result}: --force-log and --baseline have an effect only on the .csv of a recording; leave them "
                          "out.")
     check_names({options.save: (".png",), options.page: (".html",)})
     view = read_view(options.result)
@@ -64,7 +64,7 @@ def _view(options):
 
 
 def _view_recording(options):
-    """Play a recording into a strip of pictures, a GIF or an MP4."""
+    """Draw a recording as a strip of pictures, a GIF or an MP4."""
     from softtact.readout.recording import findings, with_force
     from softtact.readout.tsf85 import read_recording
     from softtact.reporting.recording_view import save_strip, save_video
@@ -75,7 +75,7 @@ def _view_recording(options):
     check_names({picture: (".png", ".gif", ".mp4")})
     recording = read_recording(options.result, baseline=options.baseline)
     if "counts" not in recording:
-        raise InputError(f"{options.result}: it holds the nodes of a simulation and no counts; give the file of its readings.")
+        raise InputError(f"{options.result}: it has nodes of a simulation but no counts; give the file of its readings.")
     if options.force_log:
         recording = with_force(recording, options.force_log)
     found = findings(recording)
@@ -90,7 +90,7 @@ def _view_recording(options):
 
 
 def _browser():
-    """The browser of this screen, or None where there is no screen or no browser."""
+    """The browser, or None without a screen or a browser."""
     import webbrowser
 
     screen = sys.platform in ("darwin", "win32") or any(name in os.environ for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))

@@ -1,13 +1,13 @@
-"""What curves and maps show: whether a curve of contact area meets the paper's words, and which features of an object stand out.
+"""The shape of curves and maps: whether a curve of contact area meets the paper's statements, and which features of an object show.
 
-Printed of the area are: it grew with the force, "but not necessarily linearly"; one circle was detected around each contact; real
-and simulated area differed by 0.008 mm2. So, stated as a rule, a curve is compatible when
+The paper states: the area grew with the force, "but not necessarily linearly"; one circle was detected around each contact; real
+and simulated area differed by 0.008 mm2. As a rule, a curve is compatible if
     it rises at every force;
     it grows by at least five times the paper's RMSE over the test, else the error would hide the growth;
-    neighbouring discs stay two pixels of the camera apart, else they merge and no circle goes around one of them;
-    no step's rate (area per force) exceeds four times the mean rate: growth in a jump would have been worth a word.
-The departure from a straight line is reported and excludes nothing.
-Of a deformation map are counted the features that stand out, and whether a lower one is seen beside a higher one.
+    neighbouring discs stay two pixels of the camera apart, else they merge and no circle surrounds a single one;
+    no step's rate (area per force) exceeds four times the mean rate, since the paper would have mentioned a jump.
+The deviation from a straight line is reported but not judged.
+For a deformation map the prominent features are counted, and a lower feature beside a higher one is measured.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,16 +24,16 @@ PAPER_RMSE_MM2 = 0.008          # section 4.1
 LEAST_GROWTH_MM2 = 5 * PAPER_RMSE_MM2
 LEAST_GAP_PIXELS = 2
 LARGEST_RATE = 4.0
-STANDS_OUT = 0.5          # of a map's largest deformation: a connected part above it is a feature
-LOWER_MM = 0.5            # how much lower the paper's lower features of objects 5 and 6 are
-_SAME_HEIGHT_MM = 0.05    # heights that are one
+STANDS_OUT = 0.5          # of a map's largest deformation; a connected part above it is a feature
+LOWER_MM = 0.5            # height difference of the paper's lower features of objects 5 and 6
+_SAME_HEIGHT_MM = 0.05    # largest difference of heights that count as equal
 
 COLUMNS = ["item", "model", "force_n", "features", "raised_mm", "lower_mm", "lower_sd_mm", "lower_points", "lower_share",
            "frustum_share"]
 
 
 def measures(force_n: "np.ndarray | pd.Series", area_mm2: "np.ndarray | pd.Series", *, pitch_mm: float) -> dict[str, float]:
-    """What the rule asks of a curve of area (f,) per frustum at forces (f,), those of 0 N left out.
+    """The quantities of the rule for a curve of area (f,) per frustum at forces (f,), without those of 0 N.
 
     growth_mm2, growth_share: from the first force to the last;  disc_gap_mm: between equal circles of the last area;
     largest_step_share: of the growth, in one step;  largest_rate: the steepest step's area per force over the mean one;
@@ -53,7 +53,7 @@ def measures(force_n: "np.ndarray | pd.Series", area_mm2: "np.ndarray | pd.Serie
 
 
 def objections(found: dict[str, float], *, pixel_mm: float) -> list[str]:
-    """What speaks against a curve of these `measures`, in words; nothing where the paper allows it."""
+    """Sentences on how a curve with these `measures` breaks the rule; empty if it is compatible."""
     least_gap = LEAST_GAP_PIXELS * pixel_mm
     reasons = []
     if not found["growth_mm2"] >= LEAST_GROWTH_MM2:
@@ -95,7 +95,7 @@ def judge(orientations: "pd.DataFrame", *, pitch_mm: float, pixel_mm: float) -> 
 
 
 def summary_sentence(records: Sequence[dict[str, Any]]) -> str:
-    """What the paper's words allow, of all orientations and laws judged."""
+    """One sentence on which of the judged orientations and laws are compatible with the paper."""
     allowed = [f"{r['orientation']} with {r['law']}" for r in records if r["allowed"]]
     orientations = list(dict.fromkeys(r["orientation"] for r in records))
     out = [name for name in orientations if not any(r["allowed"] for r in records if r["orientation"] == name)]
@@ -104,12 +104,12 @@ def summary_sentence(records: Sequence[dict[str, Any]]) -> str:
 
 
 def count_features(map_mm: np.ndarray) -> int:
-    """Connected parts (sides or corners touching) of a map (y, x) that are above STANDS_OUT of its largest value."""
+    """Number of parts, connected by sides or corners, of a map (y, x) above STANDS_OUT times its largest value."""
     return int(ndimage.label(map_mm > STANDS_OUT * map_mm.max(), structure=np.ones((3, 3)))[1])
 
 
 def feature_masks(heights_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(raised, lower) masks (y, x) of an object's underside: its lowest parts, which touch first, and those LOWER_MM above."""
+    """(raised, lower) masks (y, x) of an object's underside: the parts that touch first, and those LOWER_MM above them."""
     rise = heights_mm - np.nanmin(heights_mm)
     return rise < _SAME_HEIGHT_MM, np.abs(rise - LOWER_MM) < _SAME_HEIGHT_MM
 

@@ -1,12 +1,12 @@
-"""What limits a score: the mechanical model, the number of maps, or the network with its training; and how much the gain matters.
+"""What limits a score: the mechanical model, the number of maps, or the network; and the effect of the gain on the score.
 
 Three differences of mean SSIM, each with all else equal:
-model    the same network on the reference's maps, which the sensor measured, less that on the model's (at all maps, equal steps)
-data     all maps less the next smaller share of them (the same network, equal steps)
-network  the best network on the same maps (the two that the study trains, and the curve's) less the study's
-The largest above `CLEAR` is named. A network that reads worse than the mean training reading at that force is not trained, and
-that is named before all else. Nothing here is chosen by these numbers.
-SSIM's constants forgive errors of faint maps, so that a score depends on the gain of the readings: `gain_table` shows how much.
+model    the same network on the reference model's maps, from which the readings were made, minus on the tested model's maps
+data     all maps minus the next smaller number of maps (the same network, equal steps)
+network  the best network on the same maps (the two of the study and that of the learning curve) minus the study's
+The largest difference above `CLEAR` is reported as the limit. A network that predicts worse than the mean training reading at that
+force counts as not trained, which is reported instead. These numbers do not affect any choice of the study.
+The constants of SSIM reduce the effect of errors in faint maps, so a score depends on the gain of the readings; see `gain_table`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from softtact.sensors.specification import SensorSpec
 
-CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another seed may make (assumed)
+CLEAR = 0.01      # of mean SSIM; another seed can make a smaller difference (assumed)
 COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",
            "sentence"]
 WORDS = {"model": "the mechanical model", "data": "the number of maps", "network": "the network or its training"}
@@ -35,12 +35,12 @@ SHARES = (0.25, 0.5, 0.75, 1.0, 1.5)     # of the study's gain
 PERCENTILE = 99.0
 
 
-def limits(curves: pd.DataFrame, networks: pd.DataFrame, *, own: str, tested: Sequence[str], reference: str,
+def limits(curves: pd.DataFrame, networks: pd.DataFrame, *, architecture: str, tested: Sequence[str], reference: str,
            source: str) -> pd.DataFrame:
     """Frame with COLUMNS, a row per tested model and set.
 
     curves: learning_curve.csv of all models, the reference's (where there is one) among them;  networks: networks.csv
-    own: the study's architecture;  source: of the readings
+    architecture: the study's;  source: of the readings
     """
     compact = curves[curves.architecture == "compact"] if "compact" in set(curves.architecture) else curves
     rows = []
@@ -49,17 +49,17 @@ def limits(curves: pd.DataFrame, networks: pd.DataFrame, *, own: str, tested: Se
             scored = networks[(networks.model == model) & (networks["set"] == set_name)].set_index("architecture")
             of_set = compact[compact["set"] == set_name]
             rows.append(_row(model, set_name, scored, of_set[of_set.model == model], of_set[of_set.model == reference],
-                             own=own, source=source))
+                             architecture=architecture, source=source))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(model, set_name, scored, curve, perfect, *, own, source):
-    curve, score = curve.sort_values("maps"), scored.ssim[own]
+def _row(model, set_name, scored, curve, perfect, *, architecture, source):
+    curve, score = curve.sort_values("maps"), scored.ssim[architecture]
     gains = {"model": perfect.sort_values("maps").ssim.iloc[-1] - curve.ssim.iloc[-1] if len(perfect) else np.nan,
              "data": curve.ssim.iloc[-1] - curve.ssim.iloc[-2] if len(curve) > 1 else np.nan,
              "network": max(scored.ssim.max(), curve.ssim.iloc[-1]) - score}
     paper = PRINTED_SSIM.get(set_name, {}).get(model, np.nan)
-    mean = scored.mean_reading_ssim[own]
+    mean = scored.mean_reading_ssim[architecture]
     limit = "training" if score < mean else _largest(gains)
     return {"model": model, "set": set_name, "ssim": score, "paper": paper, "sensor_ssim": scored.sensor_ssim.iloc[0],
             "perfect_model_gain": gains["model"], "more_maps_gain": gains["data"], "other_network_gain": gains["network"],
@@ -86,11 +86,12 @@ def _sentence(score, paper, curve, gains, limit, source, mean):
 
 def gain_table(references: "Sequence[xarray.Dataset]", tested: "Mapping[str, Sequence[xarray.Dataset]]", *, spec: "SensorSpec",
                settings: VirtualSensorSettings, seed: int, ssim: dict[str, Any]) -> pd.DataFrame:
-    """A row for each gain: how far readings at the largest force fill the range, and SSIM of untrained predictors at that force.
+    """A row for each gain: how much of the range the readings at the largest force fill, and SSIM of untrained predictors there.
 
-    references: presses that the virtual sensor reads, once each;  tested: {model: the same presses with that model}
-    percentile_counts: PERCENTILE of all taxels' readings;  peak_counts: median of the maps' largest;  full_share: of taxels at the
-    end of the range;  ssim_mean: of the mean of the other presses' readings;  ssim_gap_MODEL: of the gap formula
+    references: presses that the virtual sensor reads once each;  tested: {model: the same presses with that model}
+    percentile_counts: PERCENTILE of all taxels' readings;  peak_counts: median over the maps of their largest count
+    full_share: of taxels at the end of the range;  ssim_mean: SSIM of the mean of the other presses' readings
+    ssim_gap_MODEL: SSIM of the gap formula
     """
     rows = []
     for gain in (share * settings.counts_per_relative_change for share in SHARES):

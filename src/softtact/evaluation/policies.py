@@ -1,9 +1,9 @@
-"""What choosing a model costs and what error it accepts: the paper's rule, the expected error, and always the same model.
+"""Time and error of policies that choose a model: by the paper's rule, by the expected error, or always the same model.
 
-The error of a press is the root mean square of a map's difference from the hyperelastic model's in mm, of the worst of its load
-steps; its time is that of all load steps together, under the `error` policy with both cheap models, which that policy presses
-first. The error to expect is calibrated on one set of presses (the indenters) and tested on the others; a model is taken where nine
-of ten such presses are within the tolerance, as by default.
+The error of a press is the root mean square difference in mm of its map from the hyperelastic model's, at the worst load step. Its
+time is that of all load steps; the `error` policy also pays for both fast models, which it presses first. The expected error is
+calibrated on one set of presses (the indenters) and tested on the others. A model is chosen if nine of ten such presses are within
+the tolerance, as by default.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,7 +23,7 @@ CALIBRATION_SET = "indenters"
 
 def press_table(presses: "Sequence[dict[str, xarray.Dataset]]", paper_choice: dict[str, str], *,
                 height_mm: float) -> tuple[pd.DataFrame, FoundationError]:
-    """A row per press and its worst load step: set, item, paper's model, time and error of each model, errors to expect.
+    """A row per press and its worst load step: set, item, paper's model, time, error and expected error of each model.
 
     presses: list of {model: data set of `simulate_press`};  paper_choice: {item: model};  height_mm: of a frustum
     Returns the table and the calibrated `FoundationError`.
@@ -60,7 +60,7 @@ def _row(press, paper_choice, calibrated, height_mm):
 
 
 def choices(table: pd.DataFrame, tolerance_mm: float) -> dict[str, pd.Series]:
-    """{policy: series of models} over a table's presses; by error a press takes what `press_auto` would: see its `INTERVALS`."""
+    """{policy: series of models} over the presses of a table; the `error` policy chooses as `press_auto` does, by `INTERVALS`."""
     def by_error(row):
         mostly = {model: INTERVALS[model][1] * row[f"{model}_expected_mm"] for model in MODELS[:2]}
         return cheapest({model: np.array([error]) for model, error in mostly.items()}, tolerance_mm)
@@ -70,7 +70,7 @@ def choices(table: pd.DataFrame, tolerance_mm: float) -> dict[str, pd.Series]:
 
 
 def policy_table(table: pd.DataFrame, tolerances_mm: Iterable[float], *, sets: Sequence[str]) -> pd.DataFrame:
-    """A row per policy over the presses of some sets: shares of the models, errors accepted, time, quality of the prediction."""
+    """A row per policy over the presses of some sets: shares of the models, errors, times, share of presses over the tolerance."""
     table = table[table.set.isin(sets)]
     rows: dict[str, dict[str, Any]] = {}
     for tolerance in tolerances_mm:
@@ -83,7 +83,7 @@ def _summary(table, policy, chosen, tolerance):
     error = _of_chosen(table, chosen, "error_mm")
     time = _of_chosen(table, chosen, "time_s")
     by_error = policy.startswith("error")
-    if by_error:     # both cheap models are pressed first
+    if by_error:     # both fast models are pressed first
         time = table.elastic_time_s + table.foundation_time_s + np.where(chosen == "hyperelastic", table.hyperelastic_time_s, 0.0)
     summary = {"policy": policy, "presses": len(table)}
     summary |= {f"share_{model}": float((chosen == model).mean()) for model in MODELS}
@@ -97,7 +97,7 @@ def _of_chosen(table, chosen, quantity):
                      index=table.index)
 
 
-def told_over_true(table: pd.DataFrame, model: str) -> dict[str, float]:
-    """Expected over true error of a model's presses: median, lowest and highest."""
+def expected_over_true(table: pd.DataFrame, model: str) -> dict[str, float]:
+    """Ratio of expected to true error over a model's presses: median, lowest and highest."""
     ratio = table[f"{model}_expected_mm"] / table[f"{model}_error_mm"]
     return {"median": ratio.median(), "lowest": ratio.min(), "highest": ratio.max()}

@@ -1,6 +1,6 @@
-"""Series of trainings that share all but one thing: growing, nested subsets of the maps, or the seed.
+"""Series of trainings that differ only in the number of maps (growing, nested subsets) or in the seed.
 
-Another seed gives other first weights and another order of the maps; presses and split stay.
+Another seed changes the initial weights and the order of the maps; presses and split stay the same.
 """
 
 import math
@@ -27,23 +27,23 @@ _SCORES = ["ssim", "mae_counts", "overlap"]
 
 @dataclass(frozen=True)
 class Experiment:
-    """What every training of a series shares."""
+    """The common part of all trainings of a series."""
 
     train: "Samples"
     """Maps and readings that the network is fitted to."""
     tests: "dict[str, Samples]"
-    """By the name of a set the samples that are scored; those of `validation` choose the best epoch."""
+    """Samples to score, by the name of their set; those of `validation` choose the best epoch."""
     network: dict[str, Any]
-    """As `start_run` takes it."""
+    """The argument of `start_run`."""
     options: "Training"
-    """Of each training, with its learning rate."""
+    """Settings of each training, with its learning rate."""
     ssim: dict[str, Any]
     """Window and data range of the SSIM."""
     device: "torch.device | str"
-    """That the trainings run on."""
+    """Device of the trainings."""
 
     def scores(self, part: "Samples", options: "Training", *, seed: int, label: str) -> dict[str, pd.DataFrame]:
-        """By set, `score_samples` of the best network of one training on a part of the maps."""
+        """{set: `score_samples` of the best network} of one training on a part of the maps."""
         run = start_run(part, network=self.network, learning_rate=options.learning_rate,     # type: ignore[arg-type]
                         seed=seed, device=self.device)
         for _ in train_network(run, part, self.tests["validation"], options=options, ssim=self.ssim, seed=seed, checkpoint=None,
@@ -54,10 +54,10 @@ class Experiment:
 
 
 def learning_curve(experiment: Experiment, *, sizes: Iterable[int], steps: int, seed: int) -> pd.DataFrame:
-    """Mean scores of networks trained on the first `sizes` maps of one shuffled order: SIZES_COLUMNS, a row a size and set.
+    """Mean scores of networks trained on the first `sizes` maps of one shuffled order: SIZES_COLUMNS, a row per size and set.
 
     ssim_low, ssim_high: 95 % interval of the mean over objects and trials, not over seeds of the training
-    steps: of the optimiser, as near as whole epochs allow, so that a large set is not also trained for longer
+    steps: of the optimiser, rounded to whole epochs, so that all sizes are trained equally long
     """
     rows = []
     for size in sizes:
@@ -72,14 +72,14 @@ def learning_curve(experiment: Experiment, *, sizes: Iterable[int], steps: int, 
 
 
 def train_seeds(experiment: Experiment, *, seeds: Iterable[int]) -> pd.DataFrame:
-    """Mean scores of the same training from each seed: SEEDS_COLUMNS, a row a seed and set."""
+    """Mean scores of the same training from each seed: SEEDS_COLUMNS, a row per seed and set."""
     rows = [{"seed": seed, "set": name, **scores[_SCORES].mean()} for seed in seeds
             for name, scores in experiment.scores(experiment.train, experiment.options, seed=seed, label=f"seed {seed}").items()]
     return pd.DataFrame(rows, columns=SEEDS_COLUMNS)
 
 
 def spread_of_seeds(repeats: pd.DataFrame) -> pd.DataFrame:
-    """A row with SPREAD per model, architecture and set of `train_seeds` (with these columns): mean, standard deviation, ends."""
+    """A row with SPREAD (mean, standard deviation, least and largest) per model, architecture and set of `train_seeds`."""
     groups = repeats.groupby(["model", "architecture", "set"], sort=False)
     table = groups.agg(seeds=("seed", "nunique"), ssim=("ssim", "mean"), ssim_sd=("ssim", "std"), ssim_least=("ssim", "min"),
                        ssim_most=("ssim", "max"), mae_counts=("mae_counts", "mean"), mae_sd=("mae_counts", "std"))

@@ -1,14 +1,14 @@
-"""What a score is worth: every predictor beside every other, by set and force, with its skill; and which network is not trained.
+"""Scores of networks compared with simple predictors, by set and force, with their skill; and networks that are not trained.
 
-Predictors without a network show what a network has over them:
+Predictors without a network are the baselines:
 trivial   `zeros`, `mean_reading` (of the training readings at that force), `nearest_map` (the reading of the nearest training map)
 simple    `ridge` on the taxels' mean deformations, `quadratic` (three numbers for all taxels), `gap_formula` (untrained:
           parallel plates at the map's gap)
-marks     `moved` and `halved`, the true reading one taxel off and at half its counts: no predictors, but what such an error scores
+marks     `moved` and `halved`, the true reading shifted by one taxel and at half its counts: scores of errors of a known size
 Skills:
-skill           (score - best trivial) / (ceiling - best trivial) of mean SSIM: 0 is no better than the best predictor that looks up
-                a reading, 1 is the repeatability of the sensor
-skill_simple    the same over the best simple predictor: below 0, a formula of a few numbers reads better than the network
+skill           (score - best trivial) / (ceiling - best trivial) of mean SSIM: 0 equals the best trivial predictor, 1 the
+                repeatability of the sensor
+skill_simple    the same with the best simple predictor: below 0, a formula with a few numbers predicts better than the network
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 KINDS = {"zeros": "trivial", "mean_reading": "trivial", "nearest_map": "trivial", "ridge": "simple", "quadratic": "simple",
          "gap_formula": "simple", "moved": "mark", "halved": "mark"}
-_FORCES = 20        # groups of training forces at most; an archive's forces are all different
-_PENALTY = 1e-3     # of the ridge: a share of the features' summed squares, enough against collinear taxels
+_FORCES = 20        # most groups of training forces; an archive's forces are all different
+_PENALTY = 1e-3     # of the ridge regression, over the features' summed squares: enough against collinear taxels
 
 Predictor = Callable[["Samples"], np.ndarray]     # samples to counts (n, row, column)
 NETWORK, CEILING = "network", "sensor"
@@ -45,7 +45,7 @@ def score_baselines(train: "Samples", tests: "dict[str, Samples]", *, spec: "Any
                     ssim: dict[str, Any]) -> pd.DataFrame:
     """The columns of `score_samples` and `predictor`: a row for each predictor and sample.
 
-    tests: {set: samples};  counts_per_relative_change: of the readings, for the gap formula; None where it is not known
+    tests: {set: samples};  counts_per_relative_change: of the readings, for the gap formula; None if unknown
     """
     predictors = make_predictors(train, spec=spec, counts_per_relative_change=counts_per_relative_change)
     frames = [score_predictions(predict(samples), samples, ssim=ssim).assign(predictor=name)
@@ -54,14 +54,14 @@ def score_baselines(train: "Samples", tests: "dict[str, Samples]", *, spec: "Any
 
 
 def taxel_table(indenters: "Sequence[Samples]") -> pd.DataFrame:
-    """A row for each taxel, row by row: its largest_counts over the indenters' readings, and how many indenters there are."""
+    """A row for each taxel, row by row: its largest_counts over the indenters' readings, and the number of indenters."""
     largest = np.max([samples.counts.max(axis=0) for samples in indenters], axis=0)
     names = {object_of(item) for samples in indenters for item in samples.labels["item"]}
     return pd.DataFrame({"taxel": np.arange(largest.size), "largest_counts": largest.ravel(), "indenters": len(names)})
 
 
 def make_predictors(train: "Samples", *, spec: "AnySpec", counts_per_relative_change: float | None) -> dict[str, Predictor]:
-    """{name: predictor} in the order of KINDS, fitted to the training samples where there is something to fit."""
+    """{name: predictor} in the order of KINDS, those with parameters fitted to the training samples."""
     predictors: dict[str, Predictor] = {
         "zeros": lambda samples: np.zeros_like(samples.counts), "mean_reading": _mean_reading(train),
         "nearest_map": _nearest_map(train),
@@ -74,12 +74,12 @@ def make_predictors(train: "Samples", *, spec: "AnySpec", counts_per_relative_ch
 
 
 def moved_by_a_taxel(counts: np.ndarray) -> np.ndarray:
-    """Maps (n, row, column) one row further along y; the first row is there twice."""
+    """Maps (n, row, column) shifted by one row along y; the first row is repeated."""
     return np.concatenate([counts[:, :1], counts[:, :-1]], axis=1)
 
 
 def _mean_reading(train):
-    """The mean training reading at a force: linear between the forces of training, and as at the nearest beyond them."""
+    """The mean training reading at a force, interpolated linearly between the training forces and constant beyond them."""
     force = train.labels.force_n.to_numpy()
     known = np.unique(force)
     edges = known if len(known) <= _FORCES else np.quantile(force, np.arange(_FORCES) / _FORCES)
@@ -97,12 +97,12 @@ def _mean_reading(train):
 
 
 def _nearest_map(train):
-    """The mean reading of the training map that is nearest in the sum of squares."""
-    maps, own = np.unique(train.maps_mm, axis=0, return_inverse=True)
-    own = own.ravel()
+    """The mean reading of the training map with the least sum of squared differences."""
+    maps, map_of = np.unique(train.maps_mm, axis=0, return_inverse=True)
+    map_of = map_of.ravel()
     sums = np.zeros((len(maps), *train.counts.shape[1:]))
-    np.add.at(sums, own, train.counts)
-    readings = sums / np.bincount(own)[:, None, None]
+    np.add.at(sums, map_of, train.counts)
+    readings = sums / np.bincount(map_of)[:, None, None]
 
     def predict(samples):
         asked, places = np.unique(samples.maps_mm, axis=0, return_inverse=True)
@@ -116,13 +116,13 @@ def _ridge(train):
     """Each taxel's counts as a linear function of all taxels' mean deformations."""
     features, counts = _with_one(_flat(taxel_depths(train))), _flat(train.counts).astype(float)
     penalty = np.full(features.shape[1], _PENALTY * (features[:, 1:]**2).sum() / (features.shape[1] - 1))
-    penalty[0] = 0.0      # the constant is free
+    penalty[0] = 0.0      # no penalty on the constant
     weights = np.linalg.lstsq(features.T @ features + np.diag(penalty), features.T @ counts, rcond=None)[0]
     return lambda samples: (_with_one(_flat(taxel_depths(samples))) @ weights).reshape(samples.counts.shape)
 
 
 def _quadratic(train):
-    """One quadratic of the mean deformation over the taxel, the same for all."""
+    """A quadratic function of the mean deformation over a taxel, the same for all taxels."""
     depth = taxel_depths(train)
     weights = np.linalg.lstsq(_powers(depth).reshape(-1, 3), train.counts.reshape(-1).astype(float), rcond=None)[0]
     return lambda samples: _powers(taxel_depths(samples)) @ weights
@@ -148,7 +148,7 @@ def _with_one(features):
 
 
 def score_table(networks: pd.DataFrame, baselines: pd.DataFrame, ceiling: pd.DataFrame) -> pd.DataFrame:
-    """Frame with COLUMNS: a row for each model, set, predictor, and force: all together, each, in this order.
+    """Frame with COLUMNS: a row for each model, set, predictor and force, with one over all forces first.
 
     networks, baselines: rows as of `score_samples` with the column predictor (of a network, its architecture);  ceiling: of
     `score_sensor`
@@ -167,7 +167,7 @@ def score_table(networks: pd.DataFrame, baselines: pd.DataFrame, ceiling: pd.Dat
 
 
 def force_labels(force_n: pd.Series) -> pd.Series:
-    """What the forces are called: their values or, where there are more than FORCES, the middle of one of BINS equal ranges."""
+    """Labels of forces: their values or, with more than FORCES different ones, the middle of one of BINS equal ranges."""
     if force_n.nunique() <= FORCES:
         return force_n.map("{:g}".format)
     width = force_n.max() / BINS
@@ -176,24 +176,24 @@ def force_labels(force_n: pd.Series) -> pd.Series:
 
 
 def _with_skill(table):
-    """The table with both skills; empty where the sensor was read once, or where nothing is left above a baseline."""
+    """The table with both skills; nan if the sensor was read once, or if a baseline is not below the ceiling."""
     place = ["model", "set", "force"]
-    own = table[table.kind == CEILING].set_index(place).ssim
+    ceiling = table[table.kind == CEILING].set_index(place).ssim
     for name, kind in _OF_KIND.items():
         best = table[table.kind == kind].groupby(place).ssim.max()
-        left = (own - best).where(lambda values: values > 0)
+        left = (ceiling - best).where(lambda values: values > 0)
         known = pd.DataFrame({"best": best, "left": left}).reindex(pd.MultiIndex.from_frame(table[place]))
         table[name] = (table.ssim.to_numpy() - known.best.to_numpy()) / known.left.to_numpy()
     return table
 
 
 def forces_of(table: pd.DataFrame) -> list[str]:
-    """The forces of a `score_table` in rising order, without the row of all."""
+    """The forces of a `score_table` in rising order, without the row over all forces."""
     return sorted(set(table.force) - {ALL_FORCES}, key=float)
 
 
 def level_table(table: pd.DataFrame) -> pd.DataFrame:
-    """A `score_table` with one row per predictor and set, and mean SSIM and mean absolute counts in a column for each force, N."""
+    """A `score_table` with a row per predictor and set, and columns of mean SSIM and mean absolute counts for each force in N."""
     place, forces = ["set", "model", "predictor", "kind"], forces_of(table)
     wide = table[table.force != ALL_FORCES].pivot_table(index=place, columns="force", values=["ssim", "mae_counts"], sort=False)
     columns = [(value, force) for value in ("ssim", "mae_counts") for force in forces]
@@ -203,7 +203,7 @@ def level_table(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def untrained(table: pd.DataFrame, sets: Iterable[str] | None = None) -> pd.DataFrame:
-    """Rows model, predictor, set, ssim, mean_reading of the networks that read worse than the mean reading at that force."""
+    """Rows model, predictor, set, ssim, mean_reading of networks that score below the mean reading at that force."""
     chosen = table[(table.force == ALL_FORCES) & (table["set"].isin(list(sets)) if sets is not None else True)]
     mean = chosen[chosen.predictor == "mean_reading"].set_index(["model", "set"]).ssim
     networks = chosen[chosen.kind == NETWORK]
@@ -212,10 +212,10 @@ def untrained(table: pd.DataFrame, sets: Iterable[str] | None = None) -> pd.Data
     return found[found.ssim < found.mean_reading].reset_index(drop=True)
 
 
-def verdicts(table: pd.DataFrame, *, own: str, sets: Sequence[str] = ("validation", "unseen", "grasps")) -> list[str]:
-    """Sentences on the study's networks, for the head of the report: which are not trained, and what the others are worth.
+def verdicts(table: pd.DataFrame, *, architecture: str, sets: Sequence[str] = ("validation", "unseen", "grasps")) -> list[str]:
+    """Sentences on the study's networks for the head of the report: networks that are not trained, and scores of the study's.
 
-    own: the architecture that the study's results rest on
+    architecture: that of the networks of the study's results
     """
     bad = untrained(table, sets)
     sentences = []
@@ -223,17 +223,17 @@ def verdicts(table: pd.DataFrame, *, own: str, sets: Sequence[str] = ("validatio
         means = ", ".join(f"{row.set} {row.ssim:.3f} against {row.mean_reading:.3f}" for row in rows.itertuples())
         sentences.append(f"Not trained: the {predictor} network of the {model} model reads worse than the mean training reading at "
                          f"that force (SSIM on {means}); its scores say nothing about the model.")
-    return sentences + [_worth(table, model, own) for model in table.model.unique()]
+    return sentences + [_score_sentence(table, model, architecture) for model in table.model.unique()]
 
 
-def _worth(table, model, own):
-    """One sentence on what the study's network of a model has over predictors without a network, on grasps."""
+def _score_sentence(table, model, architecture):
+    """One sentence that compares the study's network of a model with predictors without a network, on grasps."""
     forces = forces_of(table)
     rows = table[(table.model == model) & (table["set"] == "grasps") & (table.force == forces[-1])]
-    network = rows[rows.predictor == own].iloc[0]
+    network = rows[rows.predictor == architecture].iloc[0]
     rest = rows[rows.kind.isin(["trivial", "simple"])]
     best = rest.loc[rest.ssim.idxmax()]
     skill = "" if np.isnan(network.skill) else f", skill {network.skill:.2f} over the best trivial one"
-    return (f"At {forces[-1]} N on grasped objects the {own} network of the {model} model has SSIM {network.ssim:.3f} and errs by "
-            f"{network.mae_share:.0%} of the mean reading{skill}; the best predictor without a network, {best.predictor}, has "
-            f"{best.ssim:.3f} and {best.mae_share:.0%}.")
+    return (f"At {forces[-1]} N on grasped objects the {architecture} network of the {model} model has SSIM {network.ssim:.3f} "
+            f"and errs by {network.mae_share:.0%} of the mean reading{skill}; the best predictor without a network, "
+            f"{best.predictor}, has {best.ssim:.3f} and {best.mae_share:.0%}.")

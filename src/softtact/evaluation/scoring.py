@@ -1,7 +1,7 @@
-"""How well a network reads what it never saw, how well the sensor repeats itself, and how long a map takes.
+"""Scores of networks on test samples, the repeatability of the sensor, and the time per map.
 
-Intervals of a mean are bootstrapped over what belongs together: maps of one object are alike, and so are maps of one trial (one
-loading, one drift). So objects are drawn with replacement, then trials of each drawn object; a trial brings all its maps.
+Confidence intervals of a mean come from a hierarchical bootstrap, because maps of one object are alike, and so are maps of one
+trial (one loading, one drift): objects are drawn with replacement, then trials of each drawn object, each with all its maps.
 """
 
 import statistics
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
 LEVEL, REPEATS = 0.95, 2000
-SHARE = 0.1             # of the reading's largest count, from which on a taxel belongs to the patch
-FLOOR_COUNTS = 30.0     # at least: some four standard deviations of the virtual sensor's offsets and noise together
+SHARE = 0.1             # of the reading's largest count, from which a taxel belongs to the contact patch
+FLOOR_COUNTS = 30.0     # least threshold: about four standard deviations of the virtual sensor's offsets and noise together
 TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
 
 
 def score_samples(network: "torch.nn.Module", samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
-    """`score_predictions` of what a network gives for the samples' deformation maps."""
+    """`score_predictions` of a network's output for the samples' deformation maps."""
     return score_predictions(predict(network, samples.maps_mm), samples, ssim=ssim)
 
 
@@ -38,8 +38,8 @@ def score_predictions(predicted: np.ndarray, samples: Samples, *, ssim: dict[str
     """A row with SSIM_COLUMNS for each sample, of predicted counts (n, row, column) against those of the samples.
 
     ssim_own_range: SSIM whose data range is the measured map's largest count;  mean_counts: of the measured map
-    The rows of the split `validation` carry set = "validation": its items are indenters that training saw at other
-    forces.
+    The rows of the split `validation` have set = "validation"; its items are indenters that the training includes at
+    other forces.
     """
     measured = samples.counts
     frame = samples.labels.assign(model=samples.model, ssim=map_ssim(predicted, measured, **ssim),
@@ -52,12 +52,12 @@ def score_predictions(predicted: np.ndarray, samples: Samples, *, ssim: dict[str
 def score_sensor(samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
     """A row with CEILING_COLUMNS per load step with at least two trials.
 
-    Means over the trials of each one's scores against the mean of the others. A network's scores can
-    lie above it by chance, and by the noise that is left in the mean of few trials.
+    Each trial is scored against the mean of the others; the row has the means over the trials. A network's score can be higher by
+    chance, and because of the noise in the mean of few trials.
     """
     rows = []
     for (item, force), chosen in samples.labels.groupby(["item", "force_n"]).indices.items():
-        if samples.labels.trial.iloc[chosen].nunique() > 1:     # one trial at the same force twice is no repetition
+        if samples.labels.trial.iloc[chosen].nunique() > 1:     # the same trial twice at a force is not a repetition
             trials = samples.counts[chosen].astype(float)
             others = others_mean(trials)
             rows.append((samples.split, item, force, map_ssim(others, trials, **ssim).mean(),
@@ -71,7 +71,7 @@ def predict_grasps(networks: "dict[str, torch.nn.Module]", grasps: dict[str, Sam
 
     networks, grasps: {model: network}, {model: samples}
     Returns a data set tactile_map (model, item, force, row, column) and sensor_map (item, force, row, column), the mean
-    over the trials, in counts; nan where a load step is outside a model's validity.
+    over the trials, in counts; nan for load steps outside a model's validity.
     """
     labels = next(iter(grasps.values())).labels
     items, forces = sorted(labels["item"].unique()), np.sort(labels.force_n.unique())
@@ -98,22 +98,21 @@ def load_step_means(samples: Samples, maps: np.ndarray, items: list[str], forces
 def summarise_scores(scores: pd.DataFrame, ceiling: pd.DataFrame, *, seed: int) -> pd.DataFrame:
     """Frame model, set, items, maps, ssim, ssim_low, ssim_high, mae_counts, overlap, sensor_ssim of a study's scores.
 
-    ssim_low, ssim_high: 95 % interval of the mean, by bootstrap over objects, then presses and trials; nan where there is one
-    object only
-    sensor_ssim: mean of the ceiling, the sensor's trials against each other; nan where it was read once
+    ssim_low, ssim_high: 95 % interval of the mean, by bootstrap over objects, then presses and trials; nan with one object
+    sensor_ssim: mean SSIM between the sensor's trials; nan with one trial
     """
-    own = ceiling.groupby("set").ssim.mean()
+    repeatability = ceiling.groupby("set").ssim.mean()
     rows = []
     for (model, set_name), group in scores.groupby(["model", "set"], sort=False):
         low, high = interval_over_objects(group, seed=seed)
         rows.append({"model": model, "set": set_name, "items": group["item"].nunique(), "maps": len(group),
                      "ssim": group.ssim.mean(), "ssim_low": low, "ssim_high": high, "mae_counts": group.mae_counts.mean(),
-                     "overlap": group.overlap.mean(), "sensor_ssim": own.get(set_name, np.nan)})
+                     "overlap": group.overlap.mean(), "sensor_ssim": repeatability.get(set_name, np.nan)})
     return pd.DataFrame(rows)
 
 
 def interval_over_objects(scores: pd.DataFrame, *, seed: int) -> tuple[float, float]:
-    """(low, high) of the mean SSIM of a set's scores: objects are drawn, then trials of each; a trial is one press read once."""
+    """95 % interval (low, high) of the mean SSIM of a set, by bootstrap over objects, then trials (a press read once)."""
     trial = pd.factorize(scores["item"] + " " + scores.trial.astype(str))[0]
     return interval_of_mean(scores.ssim.to_numpy(), scores["item"].map(object_of), trial, seed=seed)
 
@@ -133,11 +132,10 @@ def score_items(scores: pd.DataFrame, *, seed: int) -> pd.DataFrame:
 
 def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials: "np.ndarray | pd.Series", *, seed: int,
                      level: float = LEVEL, repeats: int = REPEATS) -> tuple[float, float]:
-    """(low, high) of the mean of `values` (n,), by percentiles over `repeats` draws; items, trials (n,) say what belongs together.
+    """(low, high) of the mean of `values` (n,), from percentiles over `repeats` draws; items, trials (n,) group the values.
 
-    With a single item it is unknown how items differ: (nan, nan). With few, plain percentiles are too narrow (by a third for
-    five), so they are taken farther out, to where Student's interval of a normal sample ends (expanded percentiles, Hesterberg
-    2015).
+    With one item the scatter between items is unknown: (nan, nan). With few, plain percentiles are too narrow (by a third for
+    five), so they are expanded to the width of Student's interval of a normal sample (expanded percentiles, Hesterberg 2015).
     """
     sums, counts, n_trials = by_trial(values, items, trials)     # (item, trial) each, and (item,)
     if len(n_trials) < 2:
@@ -145,7 +143,7 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
     rng = np.random.default_rng(seed)
     drawn = rng.integers(len(n_trials), size=(repeats, len(n_trials)))                          # (repeats, item)
     picks = np.floor(rng.random((*drawn.shape, sums.shape[1])) * n_trials[drawn, None]).astype(int)   # (repeats, item, trial)
-    taken = np.arange(sums.shape[1]) < n_trials[drawn, None]     # an item brings as many trials as it has
+    taken = np.arange(sums.shape[1]) < n_trials[drawn, None]     # as many trials as the item has
     total, count = ((table[drawn[..., None], picks] * taken).sum(axis=(1, 2)) for table in (sums, counts))
     n = len(n_trials)
     tail = stats.norm.cdf(-np.sqrt(n / (n - 1)) * stats.t.ppf(0.5 * (1 + level), n - 1))
@@ -155,7 +153,7 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
 
 def by_trial(values: np.ndarray, items: "np.ndarray | pd.Series",
              trials: "np.ndarray | pd.Series") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sums and counts of `values` per item and trial, trials counted from 0 within an item; and each item's number of trials."""
+    """Sums and counts of `values` (item, trial), and the number of trials (item,); trials are numbered within an item."""
     _, item = np.unique(np.asarray(items).astype(str), return_inverse=True)
     pairs, pair = np.unique(np.stack([item, np.asarray(trials)]), axis=1, return_inverse=True)
     n_trials = np.bincount(pairs[0])
@@ -170,9 +168,8 @@ def contact_patch_overlap(predicted: np.ndarray, measured: np.ndarray, *, share:
                           floor_counts: float = FLOOR_COUNTS) -> np.ndarray:
     """Intersection over union (n,) of the contact patches of tactile maps (n, row, column) in counts.
 
-    A patch is the taxels above a threshold: `share` of the *measured* map's maximum, but no less than `floor_counts`. Both
-    maps are cut at the same counts, so a prediction of the right shape that is far too faint loses its patch. Two empty
-    patches agree: 1.
+    A patch is the taxels above a threshold: `share` of the *measured* map's maximum, at least `floor_counts`. Both maps have the
+    same threshold, so a prediction of the right shape that is much too faint has no patch. Two empty patches give 1.
     """
     threshold = np.maximum(share * measured.max(axis=(1, 2), keepdims=True), floor_counts)
     ours, theirs = predicted > threshold, measured > threshold
@@ -185,13 +182,13 @@ def time_presses(presses: "Iterable[xarray.Dataset]", networks: "dict[str, torch
     """A row per map: model, item, set, force_n, solver_s, network_s.
 
     presses: data sets of `simulate_press`;  networks {model: network};  predict(network, maps (1, y, x))
-    network_s: median over `repeats` of one map alone through the network, as one press would use it
+    network_s: median over `repeats` of the time of one map, as for one press
     """
     rows = []
     for press in presses:
         names = [press.attrs[name] for name in ("model", "item", "set")]
         network = networks[names[0]]
-        predict(network, press.deformation_map_mm.values[:1])  # the first call allocates: it is no map's cost
+        predict(network, press.deformation_map_mm.values[:1])  # the first call allocates memory and is not counted
         for load_step, force in enumerate(press.normal_force_n.values):
             one = press.deformation_map_mm.values[load_step:load_step + 1]
             network_s = statistics.median(seconds(predict, network, one) for _ in range(repeats))
@@ -200,14 +197,14 @@ def time_presses(presses: "Iterable[xarray.Dataset]", networks: "dict[str, torch
 
 
 def seconds(call: Callable[..., object], *arguments: object) -> float:
-    """Wall time of one call, s."""
+    """Wall time of one call in s."""
     start = time.perf_counter()
     call(*arguments)
     return time.perf_counter() - start
 
 
 def summarise_times(timing: pd.DataFrame) -> pd.DataFrame:
-    """Time per map of solver and network together, s: model, maps, mean, min, max, sd."""
+    """Time per map of solver and network together in s: model, maps, mean, min, max, sd."""
     total = timing.assign(total_s=timing.solver_s + timing.network_s)
     return total.groupby("model", sort=False).total_s.agg(
         maps="size", mean="mean", min="min", max="max", sd="std").reset_index()

@@ -1,4 +1,4 @@
-"""Bright contact discs in a camera frame: found by their edges, measured by an outline fitted to their light."""
+"""Bright contact discs in a camera frame: found by their edges, measured with an outline fitted to their light."""
 
 import warnings
 from functools import cached_property
@@ -34,29 +34,29 @@ from softtact.imaging.regions import EDGE_SCALE, FAINTEST, find_regions, is_ring
 DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd_mm2": float, "diameter_mm": float,
           "signal_to_noise": float, "clipped": bool, "touching": bool, "measured_by": str}
 COLUMNS = list(DTYPES)
-SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
-SURE = 3.0               # standard deviations of its area; what has less may be noise
-_MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
-_GROUND = 0.4            # of the frame; what has no outline and fills that much is rather the ground
-PASSES = 3               # fits of every disc: alone, with what the others show, and once more beside its neighbours' light
+SMALLEST_PIXELS = 6      # area; a smaller region is noise or a hot pixel
+SURE = 3.0               # least area of a disc, in its standard deviations; below, it may be noise
+_MISFIT, _RESIDUAL = 1.5, 0.08   # rms residual over noise and over contrast; above both, the contact has no such outline
+_GROUND = 0.4            # share of the frame; a bright region without outline that is larger is the background
+PASSES = 3               # fits of each disc: alone, with priors from the other discs, and again with its neighbours' light
 
 
 def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0, transfer: str = "linear",
                  lossy: bool = False) -> pd.DataFrame:
     """Table of the bright discs in a frame (rows, columns) or (rows, columns, channels), one row each.
 
-    disc             number, from 0, from top to bottom
-    x_mm, y_mm       centre, from the frame's; y grows downwards
-    area_mm2         of the contact; area_sd_mm2: the standard deviation that noise gives it
+    disc             number from 0, top to bottom
+    x_mm, y_mm       centre relative to the frame's; y grows downwards
+    area_mm2         of the contact; area_sd_mm2: its standard deviation due to noise
     diameter_mm      of the circle of that area
     signal_to_noise  contrast over the noise of one pixel, at the disc
-    clipped          cut by the frame's border: the area is what is visible, the centre that of the whole outline
-    touching         it and a neighbour were one bright region: what lies in both outlines is shared
-    measured_by      outline, or light (summed) where the contact has no simple outline
+    clipped          cut by the frame's border: the area is the visible part, the centre that of the whole outline
+    touching         part of one bright region with a neighbour: pixels in both outlines are shared between them
+    measured_by      outline, or light (summed) if the contact has no simple outline
 
-    smallest_mm: discs of a smaller diameter are left out. A frame without discs gives an empty table.
-    transfer, lossy: how values grow with light, see `softtact.imaging.light.grey`
-    Warns (`FrameWarning`) of what may be wrong with the frame.
+    smallest_mm: smallest diameter of a disc that is kept. A frame without discs gives an empty table.
+    transfer, lossy: relation of pixel values to light, see `softtact.imaging.light.grey`
+    Warns (`FrameWarning`) if the frame may not suit the detection.
     """
     return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm, transfer=transfer, lossy=lossy)[0]
 
@@ -76,7 +76,7 @@ def discs_and_outlines(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float
 
 
 def _warn(rows, image, *, lossy):
-    """Warn where what was found hardly is what was to be found."""
+    """Warn if the detected regions are probably not contact discs."""
     if not rows:
         warn_of_unseen_contrast(image, lossy=lossy)
     if sum(row["pixels"] for row in rows if row["measured_by"] == "light") > _GROUND * image.size:
@@ -96,10 +96,10 @@ def _table(rows, middle, pixel_mm):
 
 
 class Scene:
-    """All the discs of one frame, fitted beside each other.
+    """All discs of one frame, fitted together.
 
-    Light and blur change slowly over a frame, so each disc's contrast, glass and blur are known from all the others as well,
-    as far as these agree: discs that differ in brightness keep theirs. passes: 1 fits every disc alone.
+    Light and blur change slowly over a frame, so the other discs also give information on a disc's contrast, glass and blur,
+    as far as they agree; discs that differ in brightness keep their values. passes: 1 fits every disc alone.
     """
 
     def __init__(self, image: np.ndarray, *, passes: int = PASSES) -> None:
@@ -125,7 +125,7 @@ class Scene:
             self.light = self._all_light(values)
 
     def _starts(self):
-        """Parameters (discs, parameters) to begin with, from the regions."""
+        """Initial parameters (discs, parameters) from the regions."""
         centres = np.array([region.centroid for region in self.props])
         glass = self._glass(*centres.T)
         at = tuple(np.round(centres).astype(int).T)
@@ -147,7 +147,7 @@ class Scene:
         return smooth_surface(np.nonzero(away), self.image[away], weights=np.ones(away.sum()), shape=self.image.shape)
 
     def _whole_noise(self, noise):
-        """Noise of a pixel as it was before the camera cut off what was darker than black: larger than what is seen."""
+        """Noise of a pixel before the camera clipped it at black, which is larger than the noise in the frame."""
         labels = self.regions.labels
         within, away = binary_erosion(labels > 0, iterations=3), expand_labels(labels, 3) == 0
         if within.sum() > 50:
@@ -158,7 +158,7 @@ class Scene:
         return max(noise, above - middle)
 
     def _blur(self, contrast):
-        """Blur in pixels to begin with, from the steepest slope in each region."""
+        """Initial blur in pixels, from the steepest slope in each region."""
         steepest = maximum(gaussian_gradient_magnitude(self.image, EDGE_SCALE), self.regions.labels,
                            np.arange(1, len(contrast) + 1))
         wide = np.median(contrast / (np.sqrt(2 * np.pi) * steepest))
@@ -172,7 +172,7 @@ class Scene:
                            limits=self.limits)
 
     def _pixels(self, k, *, alone):
-        """Window of the frame around a disc and the mask of the pixels in it that belong to this disc."""
+        """Window of the frame around a disc, and the mask of this disc's pixels in it."""
         top, left, bottom, right = self.props[k].bbox
         window = tuple(slice(max(first - self.margin, 0), min(last + self.margin, size))
                        for first, last, size in zip((top, left), (bottom, right), self.image.shape, strict=True))
@@ -221,7 +221,7 @@ class Scene:
         return lost or is_ring(region) or (fit.misfit > _MISFIT and fit.residual > _RESIDUAL)
 
     def _by_light(self, k):
-        """Area from the summed light, whatever the contact's shape; its brightness is that of its innermost pixels."""
+        """Area from the summed light, for a contact of any shape; its brightness is that of its innermost pixels."""
         window, mask = self._pixels(k, alone=True)
         depth = distance_transform_edt(self.regions.labels[window] == k + 1)
         light = self.image[window] - self._glass(*self.props[k].centroid)
@@ -229,7 +229,7 @@ class Scene:
         return {"pixels": float(light[mask].sum() / contrast), "pixels_sd": float(np.sqrt(mask.sum()) * self.noise / contrast)}
 
     def _share(self, values):
-        """Pixels in the frame that lie in an outline; what lies in several is shared."""
+        """Number of pixels of the frame in an outline; a pixel in several outlines is shared equally."""
         window = box(values, shape=self.image.shape, margin=2)
         return float((inside(values, window) / np.maximum(self._cover[window], 1.0)).sum())
 
@@ -244,6 +244,6 @@ class Scene:
 
 
 def _limits(image):
-    """Darkest and brightest value, where so many pixels have them that the camera must have cut light off."""
+    """Darkest and brightest value, if so many pixels have them that the camera must have clipped the light."""
     return tuple(edge if (image == edge).mean() > 1e-3 else far
                  for edge, far in ((image.min(), -1e6), (image.max(), 1e6)))

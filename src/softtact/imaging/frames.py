@@ -1,4 +1,4 @@
-"""Camera frames of frustrated total internal reflection: contact shines where rubber touches the glass.
+"""Camera frames of frustrated total internal reflection: the glass shines where rubber touches it.
 
     light = illumination * (background + (disc - background) * (coverage blurred by the lens)) + noise,  cut to 0 ... 1, in 8 bits
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-BACKGROUND = 0.05   # of full scale: light that leaks where nothing touches
-BRIGHTNESS = 0.85   # of full scale: a contact at the frame's centre
+BACKGROUND = 0.05   # of full scale: stray light without contact
+BRIGHTNESS = 0.85   # of full scale: contact at the frame's centre
 _SUBROWS = 16       # lines per pixel along which a disc's chord is exact: coverage to 1e-4 of a disc of 4 pixels
 
 
@@ -27,7 +27,7 @@ class Camera:
     noise: float
     """Standard deviation as a share of full scale, the same in every pixel."""
     falloff: float
-    """Share of light lost from the frame's centre to its corners."""
+    """Relative loss of light from the frame's centre to its corners."""
     background: float = BACKGROUND
     """Share of full scale at the frame's centre without contact."""
     brightness: float = BRIGHTNESS
@@ -48,13 +48,13 @@ def render_frame(x_mm: np.ndarray, y_mm: np.ndarray, area_mm2: np.ndarray, camer
     """
     columns, rows = (int(round(side / camera.pixel_mm)) for side in footprint_mm)
     blur = camera.blur_mm / camera.pixel_mm
-    beyond = int(np.ceil(4 * blur)) + 1   # what lies just outside also shines into the frame
+    beyond = int(np.ceil(4 * blur)) + 1   # discs just outside also shine into the frame
     cover = coverage(x_mm, y_mm, area_mm2, shape=(rows + 2 * beyond, columns + 2 * beyond), pixel_mm=camera.pixel_mm)
     return expose(gaussian_filter(cover, blur)[beyond:-beyond, beyond:-beyond], camera, seed=seed)
 
 
 def expose(cover: np.ndarray, camera: Camera, *, seed: int | Sequence[int]) -> np.ndarray:
-    """The 8-bit frame of a coverage (rows, columns) of contacts of any shape that the lens has blurred already."""
+    """The 8-bit frame of a coverage (rows, columns), already blurred by the lens, of contacts of any shape."""
     light = illumination(cover.shape, camera.falloff) * (camera.background + (camera.brightness - camera.background) * cover)
     light += camera.noise * np.random.default_rng(seed).standard_normal(light.shape)
     return np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)

@@ -1,7 +1,7 @@
-"""Light from the values of a frame: what its channels mean, how bright full scale is, which pixels show nothing.
+"""Light from the values of a frame: the meaning of its channels, its full scale, and which pixels are faulty.
 
-A camera's file rarely says where its full scale lies: 10 or 12 bits are stored in 16, masks as 0 and 1, light in floating point of
-any size. So full scale follows from the values that at least 3 x 3 pixels share, which one hot pixel does not change.
+A camera's file rarely states its full scale: 10 or 12 bits are stored in 16, masks as 0 and 1, floating-point light on any
+scale. So full scale follows from the largest values that at least 3 x 3 pixels reach, which one hot pixel does not change.
 """
 
 import warnings
@@ -15,27 +15,27 @@ from softtact.imaging.regions import FAINTEST, pixel_noise, slope_of, steepest
 SMALLEST_SIDE = 16       # pixels of a frame
 TRANSFERS = ("linear", "srgb")
 _CHANNELS = {1: (1, False), 2: (1, True), 3: (3, False), 4: (3, True)}   # stored: (of colour, whether the last is alpha)
-_SHARED = 3              # pixels; side of the square in which a value must be reached to count
-_FEW, _APART = 0.05, 4.0   # share of the pixels, and how many times brighter than all others, of what is laid over a frame
-_CONTRAST = 3.0          # standard deviations of the noise that a frame with more than noise spans; noise alone has 1.2
-_BEYOND = 2.0            # spans above and below the shared values; what is further off is a hot or dead pixel
-_SURE = 12.0             # standard deviations of the noise that a pixel may lie off in any frame
-_FRAYED = 0.2            # share of the pixels along the borders of a mask that are alone
-_DIM = 0.05              # floating-point frames below that are not stored on a scale from 0 to 1
+_SHARED = 3              # pixels; side of the square in which all pixels must reach a value for it to count
+_FEW, _APART = 0.05, 4.0   # overlay: largest share of the pixels, and brightness over that of all others
+_CONTRAST = 3.0          # least span of a frame with more than noise, in standard deviations of the noise; noise alone has 1.2
+_BEYOND = 2.0            # spans beyond the shared values, from which a pixel is hot or dead
+_SURE = 12.0             # deviation of a pixel that is always allowed, in standard deviations of the noise
+_FRAYED = 0.2            # largest share of isolated pixels along the borders of a mask
+_DIM = 0.05              # floating-point frames with a smaller range are not on a scale from 0 to 1
 _SEEN = 8.0              # standard deviations of the slope of noise
 _FAINT = 1.5 / 255       # of full scale; more than rounding
 
 
 def grey(frame: np.ndarray, *, transfer: str = "linear", lossy: bool = False) -> np.ndarray:
-    """The light (rows, columns) in a frame of any depth, as a share of full scale; colours count alike.
+    """The light (rows, columns) in a frame of any depth, as a share of full scale; the colours have equal weight.
 
-    frame: (rows, columns), or (rows, columns, channels) of grey, grey and alpha, RGB, or RGBA; what alpha lets through counts
+    frame: (rows, columns), or (rows, columns, channels) of grey, grey and alpha, RGB, or RGBA; alpha scales the light
     transfer: linear, where values are proportional to light, or srgb, where they are encoded for a screen (IEC 61966-2-1)
-    lossy: whether the frame was compressed as JPEG or video; full scale is then that of its type, for what is faint may be no light
+    lossy: whether the frame was compressed as JPEG or video; full scale is then that of its type, as faint values may be artefacts
 
-    Full scale is 255 for 8-bit frames; that of the fewest bits, at least 8, that hold the frame's range for deeper whole numbers;
+    Full scale is 255 for 8-bit frames; for deeper integers that of the fewest bits, at least 8, that hold the frame's range;
     1 for floating-point numbers from 0 to 1, and their range for others. A frame of two values is a mask, of 0 and 1.
-    Single pixels far beyond the range of all others become the median of their neighbours.
+    Single pixels far outside the range of all others are replaced by the median of their neighbours.
     """
     frame = _checked(np.asarray(frame))
     colours, opacity = _colours_and_opacity(frame)
@@ -57,13 +57,13 @@ def grey(frame: np.ndarray, *, transfer: str = "linear", lossy: bool = False) ->
 
 
 def _checked(frame):
-    """The frame, which must be a picture of numbers."""
+    """The frame, checked for its shape and type."""
     if frame.ndim not in (2, 3) or min(frame.shape[:2]) < SMALLEST_SIDE:
-        raise InputError(f"a frame of shape {frame.shape} is no picture of at least {SMALLEST_SIDE} x {SMALLEST_SIDE} pixels; "
+        raise InputError(f"a frame of shape {frame.shape} is not a picture of at least {SMALLEST_SIDE} x {SMALLEST_SIDE} pixels; "
                          "give (rows, columns) or (rows, columns, channels).")
     if frame.ndim == 3 and frame.shape[2] not in _CHANNELS:
-        raise InputError(f"a frame of shape {frame.shape} has {frame.shape[2]} channels, where 1 (grey), 2 (grey, alpha), 3 (RGB) "
-                         "or 4 (RGBA) are known; give one plane at a time.")
+        raise InputError(f"a frame of shape {frame.shape} has {frame.shape[2]} channels, but only 1 (grey), 2 (grey, alpha), "
+                         "3 (RGB) and 4 (RGBA) are read; give one plane at a time.")
     if frame.dtype.kind not in "buif":
         raise InputError(f"a frame holds {frame.dtype} in place of real numbers; save its magnitude.")
     if frame.dtype.kind == "f" and not np.isfinite(frame).all():
@@ -76,7 +76,7 @@ def _checked(frame):
 def _colours_and_opacity(frame):
     """Channels of colour (rows, columns, 1 or 3) as float64, and the share of light (rows, columns) that alpha lets through.
 
-    Alpha that is the same everywhere means nothing: some cameras leave it at 0.
+    A constant alpha is ignored, because some cameras leave it at 0.
     """
     channels = frame[..., None] if frame.ndim == 2 else frame
     count, has_alpha = _CHANNELS[channels.shape[2]]
@@ -89,7 +89,7 @@ def _colours_and_opacity(frame):
 
 
 def _from_srgb(colours, *, whole, depth):
-    """Light from values that are encoded for a screen, on a scale from 0 to 1."""
+    """Light from sRGB values, on a scale from 0 to 1."""
     highest = float(minimum_filter(colours.mean(axis=2), _SHARED).max())
     full = 255.0 if depth == 1 else _whole_scale(highest) if whole else max(highest, 1.0)
     share = np.clip(colours / full, 0.0, 1.0)
@@ -97,13 +97,13 @@ def _from_srgb(colours, *, whole, depth):
 
 
 def _shared_range(light):
-    """(lowest, highest less lowest) value that 3 x 3 pixels reach together, and the noise of a pixel; 0 where noise is all."""
+    """Lowest value and range that 3 x 3 pixels reach together, and the noise of a pixel; range 0 for a frame of only noise."""
     top, bottom = float(minimum_filter(light, _SHARED).max()), float(maximum_filter(light, _SHARED).min())
     return min(bottom, top), max(top - bottom, 0.0), pixel_noise(light)
 
 
 def _without_overlay(light):
-    """The light without what is far above all of it, and not joined to it by any value between, as blurred edges would."""
+    """The light without an overlay, i.e. pixels far above all others with no values between, such as blurred edges have."""
     few = int(_FEW * light.size)
     top = np.sort(np.partition(light, light.size - few, axis=None)[light.size - few:]) - light.min()
     gaps = np.flatnonzero((top[1:] > _APART * top[:-1]) & (top[:-1] > 0))
@@ -111,7 +111,7 @@ def _without_overlay(light):
         return light
     highest = light.min() + top[gaps[0]]
     above = light > highest
-    rest = np.where(above, median_filter(light, _SHARED), light)     # lines of a pixel are gone now, blots are not
+    rest = np.where(above, median_filter(light, _SHARED), light)     # this removes lines one pixel wide, but not blots
     wide = rest > highest
     rest[wide] = np.median(light)
     _, span, noise = _shared_range(rest)
@@ -124,7 +124,7 @@ def _without_overlay(light):
 
 
 def _without_outliers(light, bottom, span, noise):
-    """The light with the median of the neighbours in place of hot and dead pixels."""
+    """The light with hot and dead pixels replaced by the median of their neighbours."""
     margin = max(_BEYOND * span, _SURE * noise)
     far = (light > bottom + span + margin) | (light < bottom - margin)
     if margin == 0 or not far.any():
@@ -133,7 +133,7 @@ def _without_outliers(light, bottom, span, noise):
 
 
 def _is_mask(light, span):
-    """Whether light has two values, whose borders are lines: noise between neighbouring values would fray them."""
+    """Whether the light has two values in regions with smooth borders; noise between two values would fray the borders."""
     low, high = light.min(), light.max()
     if not 0 < span == high - low or not ((light == low) | (light == high)).all():
         return False
@@ -142,7 +142,7 @@ def _is_mask(light, span):
 
 
 def _full_scale(light, bottom, span, noise, *, whole):
-    """What becomes 1, above the lowest value."""
+    """The light, above the lowest value, that becomes 1."""
     if _is_mask(light, span):
         return span
     if whole:
@@ -157,7 +157,7 @@ def _whole_scale(span):
 
 
 def warn_of_unseen_contrast(light: np.ndarray, *, lossy: bool) -> None:
-    """Warn of a frame (rows, columns) in which no disc was found although it has edges beyond those of noise."""
+    """Warn of a frame (rows, columns) without discs whose edges are steeper than noise explains."""
     slope = slope_of(median_filter(light, _SHARED))
     by_chance = np.percentile(slope, 25) / np.sqrt(-2 * np.log(0.75))   # the slope's size has a Rayleigh distribution
     if slope.max() > max(_SEEN * by_chance, steepest(FAINTEST if lossy else _FAINT, blur=0.0)):

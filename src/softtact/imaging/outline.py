@@ -1,4 +1,4 @@
-"""The outline of one disc, fitted to the light of its pixels, and what all discs of a frame show of light and blur.
+"""The outline of one disc, fitted to the light of its pixels, and priors of light and blur from all discs of a frame.
 
 Symbols (lengths in pixels)
     rho, phi     polar coordinates of a pixel about the disc's centre
@@ -31,21 +31,21 @@ NAMES = ("a", "b", "s", "row", "column", "R", *(f"{part}{m}" for m in HARMONICS 
 A, B, S, ROW, COLUMN, R = range(6)
 SHAPE = slice(6, 6 + 2 * len(HARMONICS))
 STEPS = 12
-_STILL = 0.004  # pixels; a tenth of what noise leaves open at best
-_HALVINGS, _WORSE = 8, 4.0      # of a step that makes the misfit so many times larger; up to that it mends itself mostly
-_FAR = 5.0     # blurs from the outline: beyond, the light is that of glass or of the disc's middle
-_FLAT = 8.0    # blurs: a larger radius is locally straight, to 1e-3 of the contrast
+_STILL = 0.004  # pixels; a tenth of the smallest error due to noise
+_HALVINGS, _WORSE = 8, 4.0      # halvings of a step that makes the misfit more than so many times larger; less mostly recovers
+_FAR = 5.0     # blurs from the outline, beyond which the light is that of the glass or of the disc's middle
+_FLAT = 8.0    # blurs: the outline of a larger radius is locally straight, to 1e-3 of the contrast
 SHAPE_SD = np.repeat([0.15, 0.08, 0.08], 2)   # of the radius: harmonics 2 (an ellipse of 1.3 has 0.13), 3, 4
-FEWEST = 4            # discs; fewer show nothing of each other
-UNKNOWN = 1e6         # standard deviation of what is not known
+FEWEST = 4            # discs; fewer give each other no prior
+UNKNOWN = 1e6         # standard deviation of an unknown parameter
 _SHARED = slice(0, 3)  # contrast, glass, blur
-_CERTAIN = 0.2        # of the contrast: discs whose contrast is known to that much show whether discs differ
-_CHANGE = 0.3         # of the contrast and of the blur: by how much each term of the polynomial may change them
+_CERTAIN = 0.2        # relative error of the contrast up to which a disc counts for the scatter between discs
+_CHANGE = 0.3         # prior standard deviation of each term of the polynomial, over contrast and blur
 
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the parameters before a fit: means and standard deviations (parameters,); infinite: nothing."""
+    """Means and standard deviations (parameters,) of the parameters before a fit; `UNKNOWN` is the deviation of an unknown one."""
 
     mean: np.ndarray
     sd: np.ndarray
@@ -62,7 +62,7 @@ class Outline:
 
     @property
     def area(self) -> float:
-        """Area in pixels; the mean square that noise adds to each squared parameter is taken off."""
+        """Area in pixels, corrected for the mean square that noise adds to each squared parameter."""
         squares = self.values**2 - np.diag(self.covariance)
         return np.pi * (squares[R] + 0.5 * squares[SHAPE].sum())
 
@@ -74,7 +74,7 @@ class Outline:
         return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
 
     def sd_of(self, measure: Callable[[np.ndarray], float]) -> float:
-        """Standard deviation of `measure` (a function of the parameters), from its slopes."""
+        """Standard deviation of `measure`, a function of the parameters, by linear error propagation."""
         slope = np.zeros(len(self.values))
         for k in range(ROW, len(slope)):
             ends = [self.values.copy() for _ in range(2)]
@@ -86,21 +86,21 @@ class Outline:
 
 def fit_outline(rows: np.ndarray, columns: np.ndarray, light: np.ndarray, *, start: np.ndarray, prior: Prior, noise: float,
                 other: float | np.ndarray = 0.0, limits: tuple[float, float] = (-1e6, 1e6)) -> Outline:
-    """The `Outline` of the disc in pixels (n,) of brightness `light` (n,); `other`: light of its neighbours (n,)."""
+    """Fit the `Outline` of a disc to pixels (n,) of brightness `light` (n,); `other` (n,): light of its neighbours."""
     weight = 1.0 / prior.sd**2
 
-    def look(values):
-        """Values, brightness and slopes there, and what is to become least: squared misfit and squared distance from the prior."""
+    def evaluate(values):
+        """Values, their brightness and slopes, and the objective: squared misfit plus squared distance from the prior."""
         model, slopes = _light(values, rows, columns, other)
         model, passed = clipped(model, noise=noise, limits=limits)
         return values, model, slopes * passed, ((light - model) ** 2).sum() / noise**2 + weight @ (prior.mean - values) ** 2
 
-    values, model, slopes, misfit = look(start.copy())
+    values, model, slopes, misfit = evaluate(start.copy())
     for _ in range(STEPS):
         normal = slopes @ slopes.T / noise**2 + np.diag(weight)
         step = np.linalg.lstsq(normal, slopes @ (light - model) / noise**2 + weight * (prior.mean - values), rcond=1e-12)[0]
-        # A whole step of Gauss and Newton can lead away from a disc that begins a little beside its place.
-        trials = (look(_bounded(values, 0.5**halving * step)) for halving in range(_HALVINGS))
+        # A full Gauss-Newton step can diverge if the start is slightly off the disc's centre.
+        trials = (evaluate(_bounded(values, 0.5**halving * step)) for halving in range(_HALVINGS))
         found = next((trial for trial in trials if trial[-1] < _WORSE * misfit), None)
         if found is None:
             break
@@ -113,7 +113,7 @@ def fit_outline(rows: np.ndarray, columns: np.ndarray, light: np.ndarray, *, sta
 
 
 def _bounded(values, step):
-    """A step no longer than a quarter of the radius, to a radius and a blur above zero."""
+    """The values after a step of at most a quarter of the radius; radius and blur stay above zero."""
     most = 0.25 * values[R]
     moved = values + np.concatenate([step[:S], np.clip(step[S:], -most, most)])
     moved[S], moved[R] = np.clip(moved[S], 0.3, 20.0), max(moved[R], 0.3)
@@ -140,7 +140,7 @@ def _share(values, rows, columns):
 
 
 def _polar(values, rows, columns):
-    """Outline's radius (n,) in the direction of each pixel, the harmonics, and (rows, columns, rho) from the centre."""
+    """Radius (n,) of the outline towards each pixel, the harmonics, and (rows, columns, rho) from the centre."""
     dr, dc = rows - values[ROW], columns - values[COLUMN]
     rho = np.maximum(np.hypot(dr, dc), 1e-6)
     turn = (dc + 1j * dr) / rho
@@ -161,7 +161,7 @@ def blurred_disc(radius: np.ndarray, rho: np.ndarray, s: float) -> tuple[np.ndar
 
 
 def clipped(light: np.ndarray, *, noise: float, limits: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (n,) of brightness plus noise once a camera has cut it off at its limits, and its slope along the brightness."""
+    """Mean (n,) of brightness plus noise after clipping at a camera's limits, and its slope along the brightness."""
     low, high = ((limit - light) / noise for limit in limits)
     passed = ndtr(high) - ndtr(low)
     return light + noise * (_excess(low) - _excess(-high)), passed
@@ -173,7 +173,7 @@ def _excess(z):
 
 
 def box(values: np.ndarray, *, shape: tuple[int, int], margin: float) -> tuple[slice, ...]:
-    """Slices of the pixels around an outline, as far as they lie in the frame."""
+    """Slices of the pixels around an outline, within the frame."""
     reach = values[R] + np.abs(values[SHAPE]).sum() + margin
     return tuple(slice(int(np.clip(np.floor(m - reach), 0, n)), int(np.clip(np.ceil(m + reach) + 1, 0, n)))
                  for m, n in zip(values[[ROW, COLUMN]], shape, strict=True))
@@ -201,18 +201,18 @@ def corners(values: np.ndarray, *, count: int = 72) -> np.ndarray:
 
 
 def first_priors(start: np.ndarray) -> list[Prior]:
-    """`Prior` of each disc (discs, parameters) before any fit: regions show contrast and blur to about a half."""
+    """`Prior` of each disc (discs, parameters) before any fit: regions give contrast and blur to within about a half."""
     sd = np.full(start.shape, UNKNOWN)
     sd[:, 0], sd[:, 2] = 0.5 * start[:, 0], 0.3 + 0.5 * start[:, 2]
     return _with_shape(start, sd)
 
 
 def pooled_priors(fits: Sequence[Outline], priors: Sequence[Prior], *, shape: tuple[int, int]) -> list[Prior]:
-    """`Prior` of each disc from the fits of all, made under `priors`."""
+    """`Prior` of each disc from the fits of all discs, which used `priors`."""
     values = np.array([fit.values for fit in fits])
     if len(fits) < FEWEST:
         return [Prior(one.mean, one.sd) for one in priors]
-    precision, pull = _own(fits, priors)
+    precision, pull = _information(fits, priors)
     basis = terms(values[:, ROW], values[:, COLUMN], shape)
     shared = _solve(precision, pull, basis, scale=np.median(values[:, _SHARED], axis=0))
     sd = np.full(values.shape, UNKNOWN)
@@ -223,15 +223,15 @@ def pooled_priors(fits: Sequence[Outline], priors: Sequence[Prior], *, shape: tu
 
 
 def _with_shape(mean, sd):
-    """The priors, with outlines that are round unless the light says otherwise."""
+    """The priors, with harmonics about zero: an outline is round unless the light shows another shape."""
     mean = mean.copy()
     sd[:, R + 1:] = np.maximum(mean[:, [R]], 1.0) * SHAPE_SD
     mean[:, R + 1:] = 0.0
     return [Prior(*pair) for pair in zip(mean, sd, strict=True)]
 
 
-def _own(fits, priors):
-    """Information in each disc's pixels: precision (discs, 3, 3) and precision times value (discs, 3)."""
+def _information(fits, priors):
+    """Information in each disc's pixels without its prior: precision (discs, 3, 3) and precision times value (discs, 3)."""
     before = np.array([np.diag(prior.sd[_SHARED] ** -2.0) for prior in priors])
     after = np.array([np.linalg.pinv(fit.covariance[_SHARED, _SHARED]) for fit in fits])
     pull = np.einsum("kij,kj->ki", after, [fit.values[_SHARED] for fit in fits])
@@ -239,7 +239,7 @@ def _own(fits, priors):
 
 
 def _solve(precision, pull, basis, *, scale):
-    """The polynomials that suit all discs best, at the discs (discs, 3)."""
+    """Values at the discs (discs, 3) of the polynomials that best fit all discs."""
     count = len(basis)
     normal = np.einsum("tk,uk,kij->tiuj", basis, basis, precision).reshape(3 * count, -1)
     change = _CHANGE * scale[[0, 0, 2]]
@@ -249,12 +249,12 @@ def _solve(precision, pull, basis, *, scale):
 
 
 def _spread_over(precision, pull, shared):
-    """Standard deviation (3,) by which discs differ from the polynomials beyond their errors."""
+    """Standard deviation (3,) of the discs from the polynomials beyond their errors."""
     covariance = np.linalg.pinv(precision, hermitian=True)
     variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-12)
     certain = np.sqrt(variance[:, 0]) < _CERTAIN * np.abs(shared[:, 0])
     if certain.sum() < FEWEST:
-        return np.zeros(3)   # discs so small that the contrast of none is known
+        return np.zeros(3)   # too small for a known contrast
     z = (np.einsum("kij,kj->ki", covariance, pull) - shared)[certain] / np.sqrt(variance[certain])
     spread = (1.4826 * np.median(np.abs(z), axis=0)) ** 2
     by_chance = 1 + 2.3 / np.sqrt(len(z))   # one sd of that estimate above what errors alone give

@@ -1,8 +1,8 @@
-"""Frames from files: an image, a folder of images, the pages of a TIFF, a video. One frame is in memory at a time.
+"""Read frames from an image, a folder of images, the pages of a TIFF or a video. One frame is in memory at a time.
 
-Each comes at the depth and with the colours that the file holds, and its values grow with light: white-is-zero is turned,
-palettes and inks become RGB (TIFF 6.0, Adobe 1992). A TIFF's frames are its pages, or the planes that ImageJ and others put behind
-a single page; reduced copies (thumbnails, pyramids) are no frames.
+A frame keeps the file's depth and colours, and its values grow with light: white-is-zero is inverted, palettes and inks become
+RGB (TIFF 6.0, Adobe 1992). A TIFF's frames are its pages, or the planes that ImageJ and others store after a single page;
+reduced copies (thumbnails, pyramids) are skipped.
 """
 
 import importlib.util
@@ -31,15 +31,15 @@ MOST_PIXELS = 100_000_000   # of a frame; detection takes about 170 bytes for ea
 SRGB_HINT = ("the file says that its values are encoded for a screen (sRGB), and they are taken as proportional to light; "
              "give --transfer srgb, or --transfer linear if they are.")
 _FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF")
-_DEEP_COLOURS = (2, 4, 6)   # colour types of a PNG (RGB, grey and alpha, RGBA) that Pillow cuts to 8 bits
+_DEEP_COLOURS = (2, 4, 6)   # colour types of a PNG (RGB, grey and alpha, RGBA) that Pillow reduces to 8 bits
 _DEPTH, _COLOUR_TYPE = 24, 25     # bytes of a PNG file
-_ENCODED = 0.6              # a larger gamma in a PNG says that values are proportional to light
+_ENCODED = 0.6              # a larger gamma in a PNG means that values are proportional to light
 _AS_STORED = ("1", "L", "LA", "RGB", "RGBA", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
 _EXIF_SRGB = 1
 _ORIENTATION, _ICC_PROFILE = 274, 34675
-_ASSOCIATED, _UNASSOCIATED = 1, 2     # alpha that the colours are multiplied by already, and that they are not
+_ASSOCIATED, _UNASSOCIATED = 1, 2     # whether the colours are already multiplied by alpha
 _MOST_BITS = 16
-_ENOUGH = 0.9     # of the stated length; what ends before was cut off
+_ENOUGH = 0.9     # of the stated length; a shorter video is truncated
 
 
 def read_frames(path: str | Path, *, every: int = 1) -> Iterator[tuple[str, np.ndarray]]:
@@ -80,7 +80,7 @@ def read_frame(file: str | Path) -> np.ndarray:
 
 
 def _numbered(file, *, every):
-    """Pairs (name, frame) of one file; the only frame of an image bears the name of the file."""
+    """Pairs (name, frame) of one file; a single image has the name of the file."""
     if not file.is_file():
         raise InputError(f"{file}: there is no such file.")
     with _in_one_sentence(file):
@@ -102,12 +102,12 @@ def _reader(file):
 
 @contextmanager
 def _in_one_sentence(file):
-    """Whatever a reader raises becomes one sentence that names the file."""
+    """Turn any error of a reader into one sentence that names the file."""
     try:
         yield
     except InputError as error:
         raise error if str(error).startswith(str(file)) else InputError(f"{file}: {error}") from None
-    except Exception as error:     # of a damaged file, decoders raise anything
+    except Exception as error:     # decoders raise errors of many kinds for a damaged file
         kind = "video" if file.suffix.lower() in VIDEOS else "image"
         raise InputError(f"{file}: not a readable {kind} ({_short(error)}); save it again, or convert it to PNG.") from None
 
@@ -119,7 +119,7 @@ def _short(error):
 
 
 def still_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarray]]]:
-    """Pairs (number, function that reads the frame): those of an animation, or the one picture, whose number is None.
+    """Pairs (number, function that reads the frame) of an animation, or of a single picture with the number None.
 
     A function is to be called before the next pair is asked for.
     """
@@ -143,7 +143,7 @@ def still_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarr
 
 
 def check_size(width: int, height: int) -> None:
-    """Refuse a frame that does not fit into memory, or whose sides are damaged."""
+    """Refuse a frame that is too large for the memory, or whose size is invalid."""
     if width * height > MOST_PIXELS:
         raise InputError(f"a frame of {width} x {height} pixels is larger than {MOST_PIXELS / 1e6:.0f} million pixels; "
                          "crop it, or average pixels.")
@@ -174,7 +174,7 @@ def _frame(image, number):
 
 
 def turned(frame: np.ndarray, orientation: int) -> np.ndarray:
-    """A frame as it is to be looked at, from the orientation 1 to 8 of TIFF and Exif."""
+    """A frame turned upright, from its orientation 1 to 8 of TIFF and Exif."""
     if orientation >= 5:
         frame = frame.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):
@@ -189,7 +189,7 @@ def _warn_of_encoding(image):
 
 
 def tiff_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarray]]]:
-    """Pairs (number, function that reads the frame); the number of the only frame of a file is None.
+    """Pairs (number, function that reads the frame); the number of a file's only frame is None.
 
     A function is to be called before the next pair is asked for.
     """
@@ -208,7 +208,7 @@ def tiff_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarra
 
 
 def _series(stack):
-    """The series of a file; what tifffile only logs, such as planes that are missing at the end, is raised."""
+    """The series of a file. Raises ValueError for faults that tifffile only logs, such as missing planes at the end."""
     faults: list[str] = []
     logger, handler = logging.getLogger("tifffile"), logging.Handler(logging.ERROR)
     handler.emit = lambda record: faults.append(record.getMessage())
@@ -223,12 +223,12 @@ def _series(stack):
 
 
 def _layout(page: tifffile.TiffPage | tifffile.TiffFrame) -> tifffile.TiffPage:
-    """The page whose tags a page shares: itself, but in long stacks that are read in haste."""
+    """The page that holds a page's tags: itself, or the key frame where tifffile skipped reading the tags of a long stack."""
     return cast(tifffile.TiffPage, page.keyframe)
 
 
 def _frames_of(stack, page, series):
-    """Functions that read the frames of one page: its picture, and the planes behind it that have no pages."""
+    """Functions that read the frames of one page: its picture, and planes stored after it without pages."""
     key = _layout(page)
     check_size(key.imagewidth, key.imagelength)
     planes = series.size // page.size if series is not None and page.size else 1
@@ -240,7 +240,7 @@ def _frames_of(stack, page, series):
 
 
 def _check_extent(stack, page):
-    """Refuse a page whose data lie beyond the end of the file, or are missing: they would be read as 0."""
+    """Refuse a page with data missing or beyond the end of the file, which would be read as 0."""
     extents = list(zip(page.dataoffsets, page.databytecounts, strict=True))
     if not extents or any(count == 0 or offset + count > stack.filehandle.size for offset, count in extents):
         raise ValueError("parts of its data are missing")
@@ -273,7 +273,7 @@ def _light(values, page):
 
 
 def _without_extra(values, key):
-    """The values without channels that are no colour; alpha stays where colours are not multiplied by it."""
+    """The values of the colours; alpha is kept if the colours are not multiplied by it."""
     extra = tuple(key.extrasamples)
     if not extra:
         return values
@@ -295,13 +295,13 @@ def _meaning(values, key):
     if name == "SEPARATED" and values.shape[2:] == (4,):
         ink = values / np.float64(2**key.bitspersample - 1)
         return (1 - ink[..., :3]) * (1 - ink[..., 3:])
-    if name in ("MINISBLACK", "RGB") or (name == "YCBCR" and key.compression.name == "JPEG"):     # which the codec turns into RGB
+    if name in ("MINISBLACK", "RGB") or (name == "YCBCR" and key.compression.name == "JPEG"):     # the codec converts it to RGB
         return values
-    raise ValueError(f"its values mean {name}, which is not read here")
+    raise ValueError(f"its photometric interpretation {name} is not supported")
 
 
 def _negative(values, key):
-    """White-is-zero turned around."""
+    """Values of white-is-zero, inverted."""
     if values.dtype.kind == "f":
         return -values
     if values.dtype.kind == "b":
@@ -342,7 +342,7 @@ def _decoded(container):
 
 
 def _length_s(container, stream):
-    """Seconds until the last frame begins, as the file states it for its video alone; 0 where it does not."""
+    """Start of the last frame in s, as stated by a file with a single stream; 0 if it states none."""
     if len(container.streams) > 1 or not container.duration or not stream.average_rate:
         return 0.0
     return container.duration / 1e6 - 2 / float(stream.average_rate)

@@ -1,9 +1,8 @@
-"""Where a frame shines: regions of pixels, one per disc, found by the edges around them.
+"""Bright regions of a frame, one per disc, found by the edges around them.
 
-Light that only varies slowly, however bright, has no edges, so an empty frame has no regions whatever its unevenness. The
-brightness to cut at is read off the edges themselves (Yanowitz and Bruckstein, 1989): a smooth surface through them lies
-halfway between glass and disc in every part of an uneven frame; close to edges it follows them, so that dim discs beside bright
-ones count.
+Light that varies slowly has no edges, so an empty frame has no regions, however uneven its light. The threshold of brightness
+follows from the edges themselves (Yanowitz and Bruckstein, 1989): a smooth surface through them lies halfway between glass and
+disc in every part of an uneven frame. Near edges the threshold follows them, so that dim discs beside bright ones are found.
 """
 
 from collections.abc import Callable
@@ -19,20 +18,20 @@ if TYPE_CHECKING:
     from skimage.measure._regionprops import RegionProperties
 
 EDGE_SCALE = 1.5        # pixels; sd of the filter that finds edges
-EDGE_SIGNIFICANCE = 6.5  # sd of the noise: one pixel in 1e9 of an empty frame; skewed noise at black has a longer tail
+EDGE_SIGNIFICANCE = 6.5  # sd of the noise: reached by one pixel in 1e9 of an empty frame; clipped noise at black has a longer tail
 WIDEST_EDGE = 8.0       # pixels; sd of the widest blur at which contact is distinguished from uneven light
-FAINTEST = 0.02         # of full scale; less contrast is compression or striped electronics, not a disc
+FAINTEST = 0.02         # of full scale; less contrast comes from compression or stripes of the electronics, not from a disc
 _NEARBY = 6.0           # pixels; sd of the neighbourhood in which edges belong to one disc
-_SMOOTH = 1.0           # pixels; sd of the filter before the cut
-_FEWEST_PIXELS = 4      # above the cut; what has fewer cannot be measured
-_FAR, _ENOUGH = 4.0, 300   # pixels from any region, and how many of these the noise needs
+_SMOOTH = 1.0           # pixels; sd of the filter before the threshold
+_FEWEST_PIXELS = 4      # above the threshold; smaller regions cannot be measured
+_FAR, _ENOUGH = 4.0, 300   # least distance in pixels from any region for an estimate of noise, and least number of such pixels
 _CONVEX = 0.93          # of the convex hull's area; a region that fills more of it has no waist
 _EDGED = 0.3            # share of a region's rim that must be a significant edge
 _COUNT = 1 / 255 / 12**0.5   # rounding to 8 bits is noise too
 
 
 class Regions(NamedTuple):
-    """What was found."""
+    """The regions of one frame."""
 
     labels: np.ndarray      # (rows, columns) int: 0 is glass, k the k-th disc
     threshold: np.ndarray   # (rows, columns): brightness halfway between glass and disc
@@ -45,7 +44,7 @@ def noise_of(image: np.ndarray, where: np.ndarray | None = None) -> float:
 
 
 def pixel_noise(image: np.ndarray, where: np.ndarray | None = None) -> float:
-    """Standard deviation of the noise of one pixel, from differences that are blind to slopes and few of which meet an edge.
+    """Standard deviation of the noise of one pixel, from second differences, which slopes do not change and few edges affect.
 
     where: pixels (rows, columns) bool that count; default all. Median form of J. Immerkaer, Computer Vision and Image
     Understanding 64 (1996) 300.
@@ -68,7 +67,7 @@ def find_regions(image: np.ndarray, *, noise: float) -> Regions:
 
 
 def _threshold(smooth, weights):
-    """Brightness (rows, columns) halfway between glass and disc: near an edge that of the edge, elsewhere of a smooth surface."""
+    """Brightness (rows, columns) halfway between glass and disc: near an edge that of the edge, elsewhere a smooth surface."""
     where = np.nonzero(weights)
     surface = smooth_surface(where, smooth[where], weights=weights[where], shape=smooth.shape)(*np.indices(smooth.shape))
     near = gaussian_filter(weights * (smooth - surface), _NEARBY)
@@ -76,7 +75,7 @@ def _threshold(smooth, weights):
 
 
 def slope_of(image: np.ndarray) -> np.ndarray:
-    """Change of brightness per pixel (rows, columns). At the border, where the filter sees only half, less of it counts."""
+    """Change of brightness per pixel (rows, columns). It is reduced at the border, where the filter covers half a neighbourhood."""
     slope = gaussian_gradient_magnitude(image, EDGE_SCALE)
     reach = int(2 * EDGE_SCALE)
     for border in (slope[:reach], slope[-reach:], slope[:, :reach], slope[:, -reach:]):
@@ -85,14 +84,13 @@ def slope_of(image: np.ndarray) -> np.ndarray:
 
 
 def _least_slope(smooth, noise):
-    """Change of brightness per pixel that neither noise reaches, nor the steps of 8 bits, nor light that changes over a wide
-    distance."""
+    """Least change of brightness per pixel of an edge, above that of noise, of 8-bit steps and of slowly varying light."""
     of_noise = EDGE_SIGNIFICANCE * noise / (np.sqrt(8 * np.pi) * EDGE_SCALE**2)
     return max(of_noise, steepest(FAINTEST, blur=0.0), steepest(float(np.ptp(smooth)), blur=WIDEST_EDGE))
 
 
 def steepest(contrast: float, *, blur: float) -> float:
-    """Slope in the middle of a blurred edge, as the filter that finds it sees it."""
+    """Slope in the middle of a blurred edge after the filter that finds edges."""
     return contrast / np.sqrt(2 * np.pi * (blur**2 + EDGE_SCALE**2))
 
 
@@ -100,7 +98,7 @@ def smooth_surface(where: tuple[np.ndarray, np.ndarray], values: np.ndarray, *, 
                    stiffness: float = 1e-3) -> Callable[[float | np.ndarray, float | np.ndarray], np.ndarray]:
     """A function of (rows, columns): the polynomial of second order through `values` (n,) at the places `where` ((n,), (n,)).
 
-    stiffness: what keeps it flat where there are no values, relative to the weights' sum
+    stiffness: regularisation that keeps it flat where there are no values, relative to the sum of the weights
     """
     basis, mean = terms(*where, shape), np.average(values, weights=weights)
     normal = (basis * weights) @ basis.T + stiffness * weights.sum() * np.diag([0, 1, 1, 1, 1, 1])
@@ -115,7 +113,7 @@ def terms(rows: float | np.ndarray, columns: float | np.ndarray, shape: tuple[in
 
 
 def _edged(labels, edges):
-    """The labels of regions that are large enough and have an edge for a rim, numbered anew."""
+    """The labels of regions that are large enough and bounded by an edge, renumbered."""
     near = dilation(edges, disk(1))
     rim = find_boundaries(labels, mode="inner") & (labels > 0)
     size, length = np.bincount(labels.ravel()), np.bincount(labels[rim], minlength=labels.max() + 1)
@@ -126,9 +124,9 @@ def _edged(labels, edges):
 
 
 def _above_glass(labels, slope):
-    """The labels of regions with steeper edges than the glass far from them has by chance, numbered anew.
+    """The labels of regions whose edges are steeper than chance slopes on the glass far from them, renumbered.
 
-    Compression takes the finest noise away and leaves the coarse: then `noise_of` is too low, but the glass shows it.
+    Compression removes the finest noise and keeps the coarse, so that `noise_of` is too low; the slopes on the glass are not.
     """
     far = distance_transform_edt(labels == 0) >= _FAR
     if not labels.any() or far.sum() < _ENOUGH:
@@ -139,7 +137,7 @@ def _above_glass(labels, slope):
 
 
 def _split(labels):
-    """(labels, touching): regions with a waist cut there, by a watershed of the distance to their rim."""
+    """(labels, touching): regions split at their waists by a watershed of the distance to the rim."""
     seeds, touching, count = np.zeros_like(labels), [], 0
     for region in regionprops(labels):
         inside = _seeds(region)
@@ -154,7 +152,7 @@ def _split(labels):
 
 
 def _seeds(region):
-    """One label per part of a region, on its bounding box. What is nearly convex is one part."""
+    """One label per part of a region, on its bounding box. A nearly convex region is one part."""
     if region.solidity > _CONVEX or region.area < 30 or is_ring(region):
         whole = np.zeros(region.image.shape, dtype=int)
         whole[tuple(region.coords[0] - region.bbox[:2])] = 1
@@ -164,11 +162,11 @@ def _seeds(region):
 
 
 def is_ring(region: "RegionProperties") -> bool:
-    """Whether a region is one contact with a dark middle, and not touching discs around a gap."""
+    """Whether a region is one contact with a dark middle, rather than discs that touch around a gap."""
     return region.euler_number == 0 and region.area_filled > _CONVEX * region.area_convex
 
 
 def _peaks(depth):
-    """Depths of the clear maxima; their median is a disc's radius even where one region is much larger."""
+    """Depths of the clear maxima; their median estimates a disc's radius even if one part is much larger."""
     tops = depth[h_maxima(depth, 1.0) > 0]
     return tops if len(tops) else np.array([depth.max()])

@@ -1,10 +1,10 @@
-"""Data sets: deformation maps of each model paired with the sensor's readings, split so that nothing leaks.
+"""Data sets: deformation maps of each model paired with the sensor's readings, split without leaks between training and tests.
 
 A *load step* is one press at one force. Load steps of the set `indenters` are shuffled with the seed and split into train and
-validation: each for itself (as in the paper), or all of a press, or of an object, together (`split_by`). `unseen` and `grasps` are
-tests, whose objects training never sees. All trials of a load step are on one side, for they share its deformation map.
-All models share the split, and a load step is used only where it is within every model's validity: the networks see the
-same samples. `Samples` is one split in memory: what a network is trained on, or scored with.
+validation: each on its own (as in the paper), or all those of a press, or of an object, together (`split_by`). The sets `unseen`
+and `grasps` are tests; their objects are not in the training. All trials of a load step are in one split, because they share its
+deformation map. All models share the split, and a load step is used only within every model's validity, so that all networks have
+the same samples. `Samples` is one split in memory, to train or score a network.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.files import read_dataset
 
 SPLITS = ("train", "validation", "unseen", "grasps")
-TESTS = SPLITS[1:]     # those that scores are taken on
+TESTS = SPLITS[1:]     # the splits that are scored
 TRAINING_SET = "indenters"
 OUT_OF_RANGE = "out_of_range"
 MEAN = -1  # in place of a trial's number: the mean over the trials
@@ -36,7 +36,7 @@ def build_datasets(presses: _Presses, tactile: _Readings, *, models: Sequence[st
     """Join and split presses and readings.
 
     presses {(model, set, item): dataset};  tactile {(set, item): dataset};  items: [{"set", "item"}, ...]
-    split_by: what goes to training or validation as a whole, map, press or object
+    split_by: unit that goes to training or validation as a whole: map, press or object
     training_trials: "each" makes every trial a training sample, "mean" the mean over a load step's trials
     Returns {(model, split): dataset} and the manifest, a row per model, load step and trial.
     """
@@ -56,7 +56,7 @@ def build_datasets(presses: _Presses, tactile: _Readings, *, models: Sequence[st
 
 
 def read_presses(paths: Iterable[str | Path]) -> _Presses:
-    """{(model, set, item): dataset} of press files; their attributes say what they are."""
+    """{(model, set, item): dataset} of press files, by their attributes."""
     presses: _Presses = {}
     for path in paths:
         data = read_dataset(path)
@@ -75,7 +75,7 @@ def read_tactile(paths: Iterable[str | Path]) -> _Readings:
 
 
 def check_converged(press: xarray.Dataset, path: str | Path) -> None:
-    """Refuse a press with a load step that the solver did not finish: nothing of it may be used."""
+    """Raise ConvergenceError for a press with a load step that did not converge; none of it may be used."""
     failed = press.normal_force_n.values[press.converged.values == 0]
     if len(failed):
         raise ConvergenceError(f"{path}: the press of {press.attrs.get('item')} with the model "
@@ -84,18 +84,18 @@ def check_converged(press: xarray.Dataset, path: str | Path) -> None:
 
 
 def check_items(items: Iterable[tuple[str, str]]) -> None:
-    """Refuse an item that is there twice, and an object in two sets: a test must not hold what training saw."""
+    """Refuse a duplicate item and an object in two sets: a test must not contain an object of the training."""
     sets: dict[str, str]
     sets, seen = {}, set()
     for set_name, item in items:
-        own = sets.setdefault(object_of(item), set_name)
-        if item in seen or own != set_name:
-            raise InputError(f"{item}: it is in the sets {own} and {set_name}; leave it in one of them.")
+        first = sets.setdefault(object_of(item), set_name)
+        if item in seen or first != set_name:
+            raise InputError(f"{item}: it is in the sets {first} and {set_name}; leave it in one of them.")
         seen.add(item)
 
 
 def check_item(key: tuple[str, str], presses: _Presses, tactile: _Readings, models: Sequence[str]) -> None:
-    """Refuse an item whose press or reading is missing, not finite, or at other forces than the rest."""
+    """Refuse an item whose press or reading is missing, not finite, or at forces that differ."""
     name = "/".join(key)
     if key not in tactile:
         raise InputError(f"{name}: there is no reading of the sensor; add its tactile file.")
@@ -107,8 +107,8 @@ def check_item(key: tuple[str, str], presses: _Presses, tactile: _Readings, mode
         press = presses[model, *key]
         _check_finite(press.deformation_map_mm, f"the press of {name} with the model {model}")
         if len(forces) != press.sizes["step"] or not np.allclose(forces, press.normal_force_n.values, rtol=1e-3, atol=0):
-            raise InputError(f"{name}: the model {model} is pressed at {_list(press.normal_force_n.values)} N and the sensor "
-                             f"read at {_list(forces)} N; make both at the same forces.")
+            raise InputError(f"{name}: the press with the model {model} is at {_list(press.normal_force_n.values)} N and the "
+                             f"reading at {_list(forces)} N; use the same forces for both.")
 
 
 def list_load_steps(items: Iterable[tuple[str, str]], presses: _Presses, models: Sequence[str]) -> pd.DataFrame:
@@ -123,7 +123,7 @@ def list_load_steps(items: Iterable[tuple[str, str]], presses: _Presses, models:
 
 
 def assign_splits(load_steps: pd.DataFrame, *, train_fraction: float, seed: int, split_by: str = "map") -> pd.DataFrame:
-    """`load_steps` with the column split: train or validation by lot for indenters, else the load step's set."""
+    """`load_steps` with a column split: random train or validation for indenters, else the load step's set."""
     load_steps = load_steps.assign(split=load_steps["set"].where(load_steps.usable, OUT_OF_RANGE))
     candidates = load_steps[load_steps.usable & (load_steps["set"] == TRAINING_SET)]
     item = candidates["item"]
@@ -144,9 +144,9 @@ def check_splits(load_steps: pd.DataFrame) -> None:
 
 
 def check_no_map_leaks(load_steps: pd.DataFrame, presses: _Presses, models: Sequence[str]) -> None:
-    """Refuse a test whose deformation map is one of the training set: the same shape under two names.
+    """Refuse a test with a deformation map of the training set, i.e. the same shape under two names.
 
-    A map of zeros, before an object touches, is every object's and is left out.
+    Maps of zeros, before an object touches, are ignored.
     """
     usable = load_steps[load_steps.usable]
     for model in models:
@@ -154,15 +154,15 @@ def check_no_map_leaks(load_steps: pd.DataFrame, presses: _Presses, models: Sequ
         for row in usable[usable["set"] == TRAINING_SET].itertuples():
             owners[_map_of(presses, model, row).tobytes()] = row.item
         for row in usable[usable["set"] != TRAINING_SET].itertuples():
-            own = _map_of(presses, model, row)
-            owner = owners.get(own.tobytes())
-            if owner is not None and own.any():
-                raise InputError(f"{row.set}/{row.item}: its deformation map at {row.force_n:g} N is that of the "
+            tested = _map_of(presses, model, row)
+            owner = owners.get(tested.tobytes())
+            if owner is not None and tested.any():
+                raise InputError(f"{row.set}/{row.item}: its deformation map at {row.force_n:g} N equals one of the "
                                  f"training indenter {owner}; leave one of the two out.")
 
 
 def order_samples(load_steps: pd.DataFrame, tactile: _Readings, split: str, *, seed: int, training_trials: str) -> pd.DataFrame:
-    """Samples of one split as a frame set, item, load step, force_n, trial; shuffled with the seed where a network trains."""
+    """Samples of one split as a frame set, item, load step, force_n, trial; shuffled with the seed for training."""
     chosen = load_steps[load_steps.split == split]
     mean = split == "train" and training_trials == "mean"
     rows = [(row.set, row.item, row.load_step, row.force_n, trial) for row in chosen.itertuples()
@@ -192,7 +192,7 @@ def gather(samples: pd.DataFrame, presses: _Presses, tactile: _Readings, *, mode
 
 
 def manifest(load_steps: pd.DataFrame, presses: _Presses, tactile: _Readings, models: Sequence[str]) -> pd.DataFrame:
-    """A row per model, load step and trial with the split that it went to; also of what was left out."""
+    """A row per model, load step and trial with its split, also for those left out."""
     rows = []
     for model in models:
         for row in load_steps.itertuples():
@@ -251,8 +251,8 @@ class Samples:
     """Deformation maps with the sensor's readings.
 
     maps_mm (n, y, x) float32;  counts (n, row, column) float32;  labels: a row each of set, item, trial, force_n
-    model: what made the deformation maps;  split: train, validation, unseen or grasps
-    source: what made the readings ("virtual sensor", "recording of a TSF-85", "published archive")
+    model: of the deformation maps;  split: train, validation, unseen or grasps
+    source: of the readings ("virtual sensor", "recording of a TSF-85", "published archive")
     """
 
     maps_mm: np.ndarray
@@ -266,14 +266,14 @@ class Samples:
         return len(self.maps_mm)
 
     def digest(self) -> str:
-        """Tells contents apart: 16 hex digits over model, maps and counts."""
+        """Hash of the contents: 16 hex digits over model, maps and counts."""
         content: Any = hashlib.sha256(self.model.encode())
         content.update(np.ascontiguousarray(self.maps_mm))
         content.update(np.ascontiguousarray(self.counts))
         return content.hexdigest()[:16]
 
     def range(self) -> dict[str, list[float]]:
-        """Plain values of what the samples span: [least, greatest] of the maps' maxima in mm and of the forces in N."""
+        """Ranges of the samples as plain values: [least, greatest] of the maps' maxima in mm and of the forces in N."""
         deepest, forces = self.maps_mm.max(axis=(1, 2)), self.labels.force_n
         return {"map_max_mm": [float(deepest.min()), float(deepest.max())], "force_n": [float(forces.min()), float(forces.max())]}
 

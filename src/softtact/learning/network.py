@@ -5,13 +5,13 @@ followed by 2 x 2 max-pooling with stride 1; a hidden layer of 570 neurons with 
 weights, nearly all between the last pool and the hidden layer. The paper is silent on the convolutions' activation:
 ReLU by default.
 
-`compact`, built like the sensor: a count is the mean, over one electrode, of a rising function of the deformation (plates
-come closer), with a gain and an offset. So: local features, their mean over each taxel, one look at the
-neighbouring taxels, and an affine map per taxel. 60 thousand weights; away from the borders, where zeros are padded, only
-this affine map knows where a taxel lies.
+`compact`, structured like the sensor: a count is the mean, over one electrode, of an increasing function of the deformation (the
+plates come closer), with a gain and an offset. So it has local features, their mean over each taxel, a convolution over
+neighbouring taxels, and an affine map for each taxel. It has 60 thousand weights; except near the borders, which are padded with
+zeros, only this affine map depends on the taxel's position.
 
-Inside, maps and counts are divided by two constants of the training set, so that both are of order one. The constants
-are stored with the weights: a network's face is in mm and counts.
+Inside a network, maps and counts are divided by two constants of the training set, so that both are of order one. The constants
+are stored with the weights; input and output are in mm and counts.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ class TactileNetwork(nn.Module):
         channels = [1, *filters]
         self.features = nn.Sequential(*[
             layer for n_in, n_out in zip(channels, filters, strict=False) for layer in block(n_in, n_out, activation)])
-        lost = 2 * len(filters)  # a 2 x 2 convolution and a 2 x 2 pool with stride 1 each take one row and one column
+        lost = 2 * len(filters)  # a 2 x 2 convolution and a 2 x 2 pool with stride 1 each remove one row and one column
         height, width = (side - lost for side in map_shape)
         self.hidden = nn.Linear(filters[-1] * height * width, dense)
         self.output = nn.Linear(dense, taxels[0] * taxels[1])
@@ -78,8 +78,8 @@ class CompactNetwork(nn.Module):
                  map_scale_mm: float = 1.0, count_scale: float = 1.0) -> None:
         super().__init__()
         if not all(side % 2 for side in map_shape):
-            raise InputError(f"the compact network: a map of {map_shape[0]} x {map_shape[1]} points cannot be halved with both "
-                             "its borders kept; give odd sides.")
+            raise InputError(f"the compact network: a map of {map_shape[0]} x {map_shape[1]} points cannot be halved while "
+                             "both borders are kept; give odd sides.")
         self.options = {"map_shape": list(map_shape), "taxels": list(taxels), "filters": list(filters)}
         fine, half, deep = filters
         self.features = nn.Sequential(                                       # zero padding 1: no row or column is lost
@@ -114,14 +114,14 @@ ARCHITECTURES = {network.architecture: network for network in (TactileNetwork, C
 
 
 def summed_l1(predicted: torch.Tensor, measured: torch.Tensor) -> torch.Tensor:
-    """The paper's equation 1: |difference| summed over a map's taxels, in counts; here its mean over the maps (n, 7, 4)."""
+    """The paper's equation 1: |difference| in counts summed over a map's taxels; the mean over the maps (n, 7, 4)."""
     return (predicted - measured).abs().sum(dim=(1, 2)).mean()
 
 
 def predict(network: nn.Module, maps_mm: np.ndarray, *, batch: int = 64) -> np.ndarray:
     """Tactile maps (n, row, column) in counts, as numpy, of deformation maps (n, y, x) in mm.
 
-    Equal maps, of which repeated trials have many, are given to the network once.
+    Equal maps, which are common among repeated trials, are evaluated once.
     """
     device = next(network.parameters()).device
     maps, inverse = np.unique(np.asarray(maps_mm, dtype=np.float32), axis=0, return_inverse=True)
@@ -132,7 +132,7 @@ def predict(network: nn.Module, maps_mm: np.ndarray, *, batch: int = 64) -> np.n
 
 
 def save_network(path: str | Path, network: nn.Module, *, facts: dict[str, Any]) -> None:
-    """Write weights, options and `facts` (plain values: model, seed, epoch, ...); the same network gives the same bytes."""
+    """Write weights, options and `facts` (plain values: model, seed, epoch, ...); equal networks give equal bytes."""
     weights = {name: tensor.detach().cpu() for name, tensor in network.state_dict().items()}
     save(path, {"architecture": network.architecture, "options": network.options, "weights": weights,
                 "facts": {**facts, "softtact_version": softtact.__version__}})
@@ -151,21 +151,21 @@ def load_network(path: str | Path) -> tuple[nn.Module, dict[str, Any]]:
 
 
 def save(path: str | Path, stored: dict[str, Any]) -> None:
-    """Write a dictionary of tensors and plain values, whole or not at all."""
+    """Write a dictionary of tensors and plain values, completely or not at all."""
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         torch.save(stored, file)  # into an open file: given a path, torch writes the file's name into the bytes
 
 
 def load(path: str | Path) -> dict[str, Any]:
-    """Read what `save` wrote; a file that holds anything but tensors and plain values is refused."""
+    """Read a file of `save`. Raises InputError for a file with anything but tensors and plain values."""
     try:
         return torch.load(path, map_location="cpu", weights_only=True)
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file; train the network first.") from None
-    except Exception as error:  # torch raises whatever its unpickler met
+    except Exception as error:  # torch passes on any error of its unpickler
         raise InputError(f"{path}: not a network's file ({_reason(error)}); delete it and train again.") from None
 
 
 def _reason(error):
-    """The first line of what an exception says."""
+    """The first line of an exception's message."""
     return next(iter(str(error).splitlines()), type(error).__name__)

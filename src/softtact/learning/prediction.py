@@ -1,4 +1,4 @@
-"""Maps from a user's file for a trained network, and its counts back to a file; what does not fit is refused or warned of."""
+"""Read maps from a user's file for a trained network and write its counts; unsuitable maps are refused or reported."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from softtact.errors import InputError
 from softtact.files import read_dataset, write_csv, write_dataset
 from softtact.tables import read_matrix
 
-MARGIN = 1e-3     # share by which a value may pass the training's range unsaid: files round
+MARGIN = 1e-3     # relative excess over the training's range without a remark, for rounded files
 
 
 @dataclass(frozen=True)
 class Maps:
     """Deformation maps of one file.
 
-    maps_mm (n, y, x);  force_n (n,), valid (n,) and model, where the file is a press', else None
-    x_mm (x,), y_mm (y,): the grid, where the file holds it
+    maps_mm (n, y, x);  force_n (n,), valid (n,) and model: of a press file, else None
+    x_mm (x,), y_mm (y,): the grid, if the file has one
     """
 
     maps_mm: np.ndarray
@@ -33,7 +33,7 @@ class Maps:
 
 
 def read_maps(path: str | Path, *, shape: Sequence[int]) -> Maps:
-    """The `Maps` of a press (NetCDF) or of one map (.npy, .csv); `shape` (y, x) is what the network takes."""
+    """The `Maps` of a press (NetCDF) or of one map (.npy, .csv); `shape` (y, x) is that of the network's input."""
     readers = {".nc": _read_press, ".npy": _read_npy, ".csv": _read_csv}
     if Path(path).suffix not in readers:
         raise InputError(f"{path}: maps are read from {', '.join(readers)}; give one of these.")
@@ -43,7 +43,7 @@ def read_maps(path: str | Path, *, shape: Sequence[int]) -> Maps:
     got = maps.maps_mm.shape[1:]
     if got != tuple(shape):
         turned = "; it is transposed: rows run along y" if got == tuple(shape)[::-1] else ""
-        raise InputError(f"{path}: its map has {' x '.join(map(str, got))} values and the network takes "
+        raise InputError(f"{path}: its map has {' x '.join(map(str, got))} values and the network needs "
                          f"{' x '.join(map(str, shape))} (y, x){turned}.")
     if not np.isfinite(maps.maps_mm).all():
         raise InputError(f"{path}: it holds values that are not finite; make it again.")
@@ -68,7 +68,7 @@ def _read_press(path):
 def _read_npy(path):
     try:
         values = np.load(path, allow_pickle=False)
-    except Exception as error:     # the reader of the header raises what Python's parser does
+    except Exception as error:     # the header is read with Python's parser, which raises errors of many kinds
         reason = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: not an array of numbers ({reason}); write it with numpy.save.") from None
     return _one_map(path, values)
@@ -88,12 +88,12 @@ def _one_map(path, values):
 
 
 def outside_training(maps: Maps, facts: dict[str, Any]) -> list[str]:
-    """Sentences on what the network has not seen in training; a network's file from before ranges were kept gives little."""
+    """Sentences on maps outside the range of the training; an old network file without ranges gives fewer."""
     remarks = []
     if maps.model and maps.model != facts.get("model", maps.model):
         remarks.append(f"the maps are of the model {maps.model} and the network was trained on {facts['model']}.")
     if maps.valid is not None and not maps.valid.all():
-        remarks.append(f"{(~maps.valid).sum()} of {len(maps.valid)} load steps are beyond what the press' model is valid for.")
+        remarks.append(f"{(~maps.valid).sum()} of {len(maps.valid)} load steps are outside the validity of the press' model.")
     known = facts.get("range", {})
     for name, values, unit in (("map_max_mm", maps.maps_mm.max(axis=(1, 2)), "mm deep at most"), ("force_n", maps.force_n, "N")):
         if values is not None and name in known:

@@ -1,14 +1,14 @@
-"""Data sets of random presses, written block by block so that an interrupted one goes on: HDF5, NetCDF, or LeRobot's key names.
+"""Data sets of random presses, written in blocks so that an interrupted run can continue: HDF5, NetCDF, or LeRobot's key names.
 
-Press n takes object n modulo their number, in a place and with a turn that are drawn by the seed, the object's name and n alone.
-All go through the same forces. With two fingers the object is also pressed from its other side, as in a grip.
+Press n uses object n modulo the number of objects. Its place and angle are drawn from the seed, the object's name and n only. All
+presses have the same forces. With two fingers the object is also pressed from its opposite side, as in a grip.
 
-Forms of a finished data set:
+Formats of a finished data set:
 hdf5      arrays by name: (press, force, finger, ...)
 netcdf    the same, labelled (xarray)
 lerobot   a row for each press and force, in HDF5, with the key names of LeRobot's data sets (`observation.tactile.left`,
-          `observation.force`, `episode_index`, `frame_index`, `timestamp`); an episode is a press through its forces. LeRobot
-          keeps such keys in Parquet files, which its tools make.
+          `observation.force`, `episode_index`, `frame_index`, `timestamp`); an episode is a press with its forces. LeRobot
+          stores such keys in Parquet files, which its tools create.
 """
 
 import os
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 _BEHIND = Rotation.from_euler("y", 180, degrees=True)
-_BLOCK = 32     # presses between two writings
+_BLOCK = 32     # presses written together
 TO_DO, DONE, FAILED = 0, 1, 2
 FORMATS = {"hdf5": (".h5", ".hdf5"), "netcdf": (".nc",), "lerobot": (".h5", ".hdf5")}
 FINGERS = ("left", "right")
-_FPS = 10.0     # of the timestamps: a tenth of a second between two forces; a press has no time
+_FPS = 10.0     # of the timestamps: 0.1 s between two forces, assumed because a press is quasi-static
 _DIMENSIONS = {"deformation_map_mm": ("press", "force", "finger", "y", "x"),
                "tactile_map": ("press", "force", "finger", "row", "column"), "indentation_mm": ("press", "force", "finger"),
                "within_validity": ("press", "force", "finger"), "status": ("press",), "force_n": ("force",),
@@ -47,7 +47,7 @@ _DIMENSIONS = {"deformation_map_mm": ("press", "force", "finger", "y", "x"),
 
 @dataclass(frozen=True)
 class PressPlan:
-    """What a data set holds: presses of meshes {name: trimesh in mm} on a sensor through forces (N), on one finger or on two."""
+    """The contents of a data set: presses of meshes {name: trimesh in mm} on a sensor at forces (N), on one or two fingers."""
 
     sensor: "Sensor"
     meshes: Mapping[str, trimesh.Trimesh]
@@ -60,11 +60,11 @@ class PressPlan:
     def __post_init__(self) -> None:
         self.sensor.checked_forces(self.forces_n)
         if self.presses < 1:
-            raise InputError(f"A data set of {self.presses} presses holds nothing; give 1 or more.")
+            raise InputError(f"A data set of {self.presses} presses is empty; give 1 or more.")
 
     @cached_property
     def settings(self) -> str:
-        """Digest of all that the numbers follow from."""
+        """Hash of all settings that determine the numbers."""
         shapes = {name: digest([mesh.vertices.tolist(), mesh.faces.tolist()]) for name, mesh in self.meshes.items()}
         return digest([self.sensor.spec.model_dump(mode="json"), shapes, list(self.meshes), self.presses, list(self.forces_n),
                        self.model, self.seed, self.fingers, softtact.__version__])
@@ -83,22 +83,22 @@ class PressPlan:
 
 
 def behind(mesh: trimesh.Trimesh, pose: Pose) -> Pose:
-    """The pose of an object in the frame of a second sensor that faces the first, its upper side touching."""
+    """The pose of an object in the frame of a second sensor that faces the first and touches its upper side."""
     turned = Pose(_BEHIND.apply(pose.translation_mm), _BEHIND * pose.rotation)
     return Pose(turned.translation_mm - [0.0, 0.0, turned.apply(mesh.vertices)[:, 2].min()], turned.rotation)
 
 
 def write_press_data(path: str | Path, plan: PressPlan, *, form: str = "hdf5", workers: int | None = None,
                      label: str = "presses") -> int:
-    """Write a data set, or go on with one that stopped; return how many of its presses failed, which hold zeros and a status.
+    """Write a data set, or continue an unfinished one; return the number of failed presses, which hold zeros and a status.
 
-    form: hdf5, netcdf or lerobot. While it grows it lies beside `path`, with the ending `.part`
-    Raises InputError for a form or an ending that is not known, and where another data set is there.
+    form: hdf5, netcdf or lerobot. The unfinished file lies beside `path` with the ending `.part`
+    Raises InputError for an unknown form or ending, or if another data set exists there.
     """
     path = Path(path)
     check_name(path, form)
     if path.exists():
-        raise InputError(f"{path}: there is a whole data set already; delete it, or give another name.")
+        raise InputError(f"{path}: there is already a finished data set; delete it, or give another name.")
     part = _part(path)
     with _opened(part, "a") as file:
         if "settings" in file.attrs:
@@ -112,7 +112,7 @@ def write_press_data(path: str | Path, plan: PressPlan, *, form: str = "hdf5", w
 
 
 def presses_left(path: str | Path, plan: PressPlan) -> int:
-    """How many presses a data set still needs."""
+    """Number of presses that a data set still needs."""
     part = _part(Path(path))
     if not part.exists():
         return plan.presses
@@ -122,7 +122,7 @@ def presses_left(path: str | Path, plan: PressPlan) -> int:
 
 
 def check_name(path: Path, form: str) -> None:
-    """Refuse an unknown form, or a name whose ending is not the form's."""
+    """Refuse an unknown form, or a name without the form's ending."""
     if form not in FORMATS:
         raise InputError(f"The format {form!r} is unknown; use one of {', '.join(FORMATS)}.")
     if path.suffix.lower() not in FORMATS[form]:
@@ -140,12 +140,12 @@ def _opened(path, mode):
         reason = " ".join(str(error).split())[:120]
         if mode == "a" and not path.exists():
             raise OutputError(f"{path}: cannot be written ({reason}); make its folder, or room on the disk.") from None
-        raise InputError(f"{path}: not readable as an unfinished data set ({reason}); delete it and begin anew.") from None
+        raise InputError(f"{path}: not readable as an unfinished data set ({reason}); delete it and start again.") from None
 
 
 def _refuse_other(part, file, plan):
     if file.attrs.get("settings") != plan.settings:
-        raise InputError(f"{part}: a data set of other objects or settings is unfinished there; delete it, or give another name.")
+        raise InputError(f"{part}: there is an unfinished data set of other objects or settings; delete it, or give another name.")
 
 
 def _begin(file, plan):
@@ -176,7 +176,7 @@ def _fill(file, plan, workers, label):
 
 
 def _pressed(plan, numbers, workers):
-    """[[result or error of each finger]] of some presses."""
+    """[[result or error of each finger]] of the presses `numbers`."""
     meshes = [plan.mesh_of(number) for number in numbers]
     poses = [[Pose.from_values(plan.poses[number])] for number in numbers]
     if plan.fingers == 2:
@@ -188,7 +188,7 @@ def _pressed(plan, numbers, workers):
 
 
 def _keep(file: Any, number: int, results: Sequence[Any]) -> None:
-    """Write the results of one press, by finger; one that failed leaves zeros."""
+    """Write the results of one press for each finger; a failed one keeps zeros."""
     if any(isinstance(one, SofttactError) for one in results):
         file["status"][number] = FAILED
         return
@@ -199,7 +199,7 @@ def _keep(file: Any, number: int, results: Sequence[Any]) -> None:
 
 
 def finish(part: Path, path: Path, form: str) -> None:
-    """Turn a filled file into the data set of a form; the unfinished one goes away."""
+    """Convert a complete file to the data set of a form, and delete the file."""
     if form == "hdf5":
         os.replace(part, path)
         return
@@ -219,7 +219,7 @@ def _as_netcdf(file, path):
 
 
 def _as_lerobot(file, path):
-    """Rows of the presses that were done."""
+    """Rows of the successful presses."""
     done = np.flatnonzero(file["status"][:] == 1)
     presses, forces = len(done), len(file["force_n"])
     taxels = file["tactile_map"][:][done]

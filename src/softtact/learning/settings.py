@@ -1,6 +1,6 @@
-"""What a study may choose about its networks: typed, described in place, refused in one sentence when wrong.
+"""Settings of a study's networks, each with its type and description; a wrong value is refused in one sentence.
 
-Defaults are what the paper prints; where it is silent the description says so.
+Defaults are those of the paper; a description says if the paper does not state the value.
 """
 
 from typing import Annotated, Any, Literal, Self
@@ -24,11 +24,11 @@ Rates = Annotated[tuple[PositiveFloat, PositiveFloat], pydantic.AfterValidator(_
 
 
 class Settings(Section):
-    """A section that is read by itself, as stages do."""
+    """A section that stages read without the rest of the configuration."""
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], *, where: str) -> Self:
-        """The section from plain values; the first fault becomes an `InputError` naming the key and its value."""
+        """The section from plain values; raises an InputError with key and value for the first fault."""
         try:
             return cls.model_validate(values)
         except pydantic.ValidationError as error:
@@ -41,28 +41,28 @@ class Settings(Section):
 
 
 class Compact(Settings):
-    """The small network that mirrors the sensor; it has no hidden layer and takes no part in the search."""
+    """The small network structured like the sensor; it has no hidden layer and is not part of the search."""
 
     filters: tuple[PositiveInt, PositiveInt, PositiveInt] = Field((16, 32, 64), description="full grid, halving, half grid")
-    learning_rate: PositiveFloat = Field(3e-3, description="of the first epoch, whatever `training.learning_rate` says")
+    learning_rate: PositiveFloat = Field(3e-3, description="of the first epoch, in place of `training.learning_rate`")
     epochs: PositiveInt | None = Field(None, description="at most; by default as many as in `training`")
 
 
 class Network(Settings):
-    """The network that a study's results rest on: the printed one, the search's best of its form, or the compact one.
+    """The network of a study's results: the printed one, the best of the search, or the compact one.
 
-    Beside it the other kind is trained on the same split, for comparison: compact, or printed where compact is chosen.
+    For comparison a network of the other kind is trained on the same split: compact, or printed if compact is chosen.
     """
 
     architecture: Literal["printed", "searched", "compact"] = "printed"
     filters: tuple[PositiveInt, ...] = Field((80, 95, 120), min_length=1, description="of each 2 x 2 convolution")
     dense: PositiveInt = Field(570, description="neurons of the hidden layer")
-    activation: Literal["relu", "linear"] = Field("relu", description="after a convolution; the paper is silent")
+    activation: Literal["relu", "linear"] = Field("relu", description="after a convolution; the paper does not state it")
     compact: Compact = Compact()
 
 
 class SearchSpace(Settings):
-    """Ranges that the search draws from, [smallest, largest]; equal ends hold a value fixed."""
+    """Ranges [smallest, largest] of the search; equal ends fix a value."""
 
     layers: Widths | None = Field(None, description="convolutions, the first of `filters`; by default 2 up to as many as it has")
     filters: tuple[Widths, ...] = Field(((16, 128), (16, 128), (16, 160), (16, 160)), min_length=1, description="per convolution")
@@ -77,23 +77,23 @@ class SearchSpace(Settings):
 
     @property
     def depth(self) -> tuple[int, int]:
-        """Fewest and most convolutions."""
+        """Least and greatest number of convolutions."""
         return self.layers or (min(2, len(self.filters)), len(self.filters))
 
 
 class Search(Settings):
-    """Hyperparameter search: Optuna's sampler with its Hyperband pruner. The paper prints its result only."""
+    """Hyperparameter search with Optuna's sampler and Hyperband pruner. The paper prints only its result."""
 
     trials: PositiveInt = 30
     max_epochs: PositiveInt = Field(27, description="of a trial that is never pruned")
     batch: PositiveInt = 16
     maps: PositiveInt | None = Field(None, description="training maps of a trial, drawn with the seed; all by default")
-    reduction_factor: int = Field(3, ge=2, description="of Hyperband: one in so many trials goes on")
+    reduction_factor: int = Field(3, ge=2, description="of Hyperband: one of this many trials continues")
     space: SearchSpace = SearchSpace()
 
 
 class Training(Settings):
-    """The training of one network. The paper is silent on all of it but the loss."""
+    """The training of one network. The paper states only the loss."""
 
     epochs: PositiveInt = 60
     batch: PositiveInt = Field(16, description="maps per step")
@@ -105,15 +105,15 @@ class Training(Settings):
     rate_epochs: PositiveInt = Field(4, description="of each of these trials")
     schedule: Literal["cosine", "constant"] = Field("cosine", description="of the learning rate over the epochs")
     checkpoint_every_s: NonNegativeFloat = Field(120.0, description="least time between two checkpoints")
-    device: Literal["auto", "cpu", "cuda"] = Field("auto", description="auto: a GPU where there is one")
-    threads: PositiveInt = Field(2, description="of a training; on fewer cores as many threads, for the weights depend on it")
+    device: Literal["auto", "cpu", "cuda"] = Field("auto", description="auto: a GPU if there is one")
+    threads: PositiveInt = Field(2, description="of a training, also on fewer cores, because the weights depend on their number")
 
 
 class LearningCurve(Settings):
-    """SSIM against the number of training maps: the same training on growing shares of them."""
+    """SSIM against the number of training maps: the same training on increasing shares of them."""
 
     shares: tuple[Share, ...] = Field((), description="of the training maps, rising; empty: no learning curve")
-    steps: PositiveInt = Field(300, description="of the optimiser at each share, so that more maps are not also trained for longer")
+    steps: PositiveInt = Field(300, description="of the optimiser at each share, so that all shares are trained equally long")
     networks: tuple[Literal["printed", "searched", "compact"], ...] = Field(("compact",), min_length=1)
 
     @pydantic.field_validator("shares")
@@ -125,7 +125,7 @@ class LearningCurve(Settings):
 
 
 class Repeats(Settings):
-    """The same training from several seeds, on kept presses and one split: how much of a score is chance."""
+    """The same training from several seeds, with the same presses and split, for the scatter of a score."""
 
     seeds: PositiveInt = Field(1,
                                description="trainings of each network, from the study's seed and those after it; 1: no repetition")
@@ -147,7 +147,7 @@ class Ssim(Settings):
 
 
 def chosen_network(network: Network, best: dict[str, Any] | None) -> dict[str, Any]:
-    """Architecture and its options: as printed, as the search found them (`best`), or the compact one's."""
+    """Architecture and its options: as printed, from the search (`best`), or those of the compact network."""
     if network.architecture == "compact":
         return {"architecture": "compact", "filters": network.compact.filters}
     searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" and best else {}
@@ -155,21 +155,21 @@ def chosen_network(network: Network, best: dict[str, Any] | None) -> dict[str, A
 
 
 def chosen_training(options: Training, network: Network, found: dict[str, Any] | None) -> Training:
-    """`options` with the learning rate as a number: the one found for this network, the stated one, or that of the compact network.
+    """`options` with the learning rate as a number: found for this network, stated, or that of the compact network.
 
-    found: what the search, or for the printed network the trial of rates, wrote
+    found: result of the search or, for the printed network, of the trial of rates
     """
     if network.architecture == "compact":
-        own = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
-        return options.model_copy(update=own)
+        compact = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
+        return options.model_copy(update=compact)
     if options.learning_rate != "found":
         return options
     if found is None:
-        raise InputError(f"training.learning_rate is 'found', and for the {network.architecture} network nothing has been found; "
-                         "give what find_learning_rate or the search wrote, or state a number.")
+        raise InputError(f"training.learning_rate is 'found', but no rate of the {network.architecture} network is given; "
+                         "give the result of find_learning_rate or of the search, or state a number.")
     return options.model_copy(update={"learning_rate": found["learning_rate"]})
 
 
 def found_for(network: Network, *, search: dict[str, Any] | None, trial: dict[str, Any] | None) -> dict[str, Any] | None:
-    """Of the search's best and the trial of rates, what holds for this network: a rate of another architecture does not."""
+    """The best of the search or of the trial of rates for this network; the rate of another architecture does not apply."""
     return {"printed": trial, "searched": search, "compact": None}[network.architecture]

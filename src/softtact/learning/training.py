@@ -1,8 +1,8 @@
-"""The training loop: one network, from its first weights to its best ones, and the learning rate that suits it.
+"""The training loop of one network, and the search for its learning rate.
 
-The order of the maps depends on the seed and the epoch only, and a checkpoint holds everything else: a training that
-was cut off ends with the same weights as one that was not. On a CPU, the same seed and the same number of threads give
-the same bytes. The learning rate is found by short trainings: the rate of another architecture does not carry over.
+The order of the maps depends only on the seed and the epoch, and a checkpoint holds everything else, so an interrupted training
+ends with the same weights as an uninterrupted one. On a CPU, the same seed and number of threads give the same bytes. The learning
+rate is found by short trainings, since the rate of another architecture does not carry over.
 """
 
 import math
@@ -33,7 +33,7 @@ COLUMNS = ["learning_rate", "epochs", "train_loss", "validation_loss"]
 
 @dataclass
 class Run:
-    """A network in training: all that a checkpoint holds.
+    """A network in training, i.e. the contents of a checkpoint.
 
     history: a record per epoch;  best: epoch, validation_loss and weights of the best one so far
     """
@@ -54,42 +54,42 @@ class Run:
                 "history": self.history, "best": self.best}
 
     def load_state(self, state: dict[str, Any]) -> None:
-        """Take up the run where `state` left it."""
+        """Continue from `state`."""
         self.network.load_state_dict(state["network"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.history, self.best = state["history"], state["best"]
 
 
 def prepare_torch(*, threads: int, device: str = "cpu") -> torch.device:
-    """Fix the number of threads and ask for deterministic kernels; returns the torch device."""
+    """Set the number of threads and request deterministic kernels; return the torch device."""
     torch.set_num_threads(threads)
     name = device if device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA's matrix products need to be deterministic
-    # On a GPU the pools' gradient has no deterministic kernel in every version: a warning there, an error on a CPU.
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # required for deterministic matrix products in CUDA
+    # Not every version has a deterministic kernel for the gradient of pooling on a GPU: a warning there, an error on a CPU.
     torch.use_deterministic_algorithms(True, warn_only=name == "cuda")
     return torch.device(name)
 
 
 def start_run(train: "Samples", *, network: dict[str, Any], learning_rate: float, seed: int, device: torch.device | str) -> Run:
-    """A `Run` with fresh weights; the training set's greatest map and count become the network's scales.
+    """A `Run` with initial weights; the greatest deformation and count of the training set become the network's scales.
 
-    network: dict of the architecture (printed, if not stated) and its options: filters, and dense, activation of the printed one
+    network: dict of the architecture (default: printed) and its options: filters, for the printed one also dense and activation
     """
     torch.manual_seed(seed)
     options = dict(network)
     make = ARCHITECTURES[options.pop("architecture", "printed")]
     model = make(map_shape=train.maps_mm.shape[1:], taxels=train.counts.shape[1:], **options,
                  map_scale_mm=_largest(train.maps_mm), count_scale=_largest(train.counts)).to(device)
-    # The fused update is one pass over the 94 million weights; the plain one costs as much as the gradients.
+    # The fused update makes one pass over the 94 million weights; the plain one takes as long as the gradients.
     return Run(model, torch.optim.Adam(model.parameters(), lr=learning_rate, fused=True))
 
 
 def train_network(run: Run, train: "Samples", validation: "Samples", *, options: "Training", ssim: dict[str, Any], seed: int,
                   checkpoint: Path | None, label: str = "training") -> Iterator[dict[str, Any]]:
-    """Train `run` to the end of `options` (a `Training`), or until patience ends; yields a record per epoch.
+    """Train `run` for the epochs of `options` (a `Training`), or until patience ends; yield a record per epoch.
 
-    checkpoint: file to resume from, if it belongs to this training, and to write during it; None: neither
-    ssim: window and data_range of the SSIM that the records carry
+    checkpoint: file to resume from, if it belongs to this training, and to write to; None for no file
+    ssim: window and data_range of the SSIM in the records
     """
     data = _tensors(train, run)
     rate = run.optimiser.param_groups[0]["lr"]
@@ -129,7 +129,7 @@ def train_epoch(run: Run, maps_mm: torch.Tensor, counts: torch.Tensor, *, rate: 
 
 
 def epoch_label(label: str, run: Run, options: "Training") -> str:
-    """Text of a line of progress on the present epoch."""
+    """A line of progress for the current epoch."""
     so_far = f", validation loss {run.history[-1]['validation_loss']:.0f} counts" if run.history else ""
     return f"{label}, epoch {run.epoch + 1} of {options.epochs}{so_far}"
 
@@ -154,12 +154,12 @@ def keep_best(run: Run, record: dict[str, float]) -> None:
 
 
 def out_of_patience(run: Run, patience: int) -> bool:
-    """Whether the last `patience` epochs brought no better validation loss."""
+    """Whether the last `patience` epochs did not improve the validation loss."""
     return run.epoch - run.best["epoch"] >= patience
 
 
 def training_digest(run: Run, train: "Samples", validation: "Samples", options: "Training", seed: int) -> str:
-    """Tells trainings apart: a checkpoint of other data or settings must not be taken up."""
+    """Hash of data and settings, so that a training does not resume from the checkpoint of another."""
     choices = options.model_dump(exclude={"checkpoint_every_s", "threads"})
     rate = run.optimiser.param_groups[0]["lr"]
     network = [run.network.architecture, run.network.options]
@@ -167,7 +167,7 @@ def training_digest(run: Run, train: "Samples", validation: "Samples", options: 
 
 
 def resume(run: Run, checkpoint: Path | None, owner: str) -> None:
-    """Load `checkpoint` into `run` if it is there and is the owner's."""
+    """Load `checkpoint` into `run` if it exists and belongs to the owner."""
     if checkpoint is not None and Path(checkpoint).exists():
         state = load(checkpoint)
         if state["owner"] == owner:
@@ -180,15 +180,15 @@ def _tensors(samples, run):
 
 
 def _largest(array):
-    """Greatest magnitude, or 1 for an array of zeros."""
+    """Largest magnitude, or 1 for an array of zeros."""
     return float(np.abs(array).max()) or 1.0
 
 
 def try_rates(train: "Samples", validation: "Samples", *, network: dict[str, Any], options: "Training", ssim: dict[str, Any],
               seed: int, device: "torch.device | str") -> pd.DataFrame:
-    """A row with COLUMNS for each of the options' `rates`: the same first weights, `rate_epochs` along the options' schedule.
+    """A row with COLUMNS for each of the options' `rates`: a training of `rate_epochs` epochs from the same initial weights.
 
-    The losses, in counts, are those of the last epoch: nan where the training ran away.
+    The losses in counts are those of the last epoch; nan if the training diverged.
     """
     trial = options.model_copy(update={"epochs": options.rate_epochs, "patience": options.rate_epochs})
     rows = []
@@ -198,7 +198,7 @@ def try_rates(train: "Samples", validation: "Samples", *, network: dict[str, Any
         try:
             last = list(train_network(run, train, validation, options=trial, ssim=ssim, seed=seed, checkpoint=None,
                                       label=f"rate {rate:g}"))[-1]
-        except ConvergenceError:     # too high a rate is a finding, not a failure of the trial
+        except ConvergenceError:     # a learning rate that is too high is a result, not a failure of the trial
             last = {"train_loss": np.nan, "validation_loss": np.nan}
         rows.append({"learning_rate": rate, "epochs": run.epoch, "train_loss": last["train_loss"],
                      "validation_loss": last["validation_loss"]})

@@ -121,7 +121,7 @@ def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, c
     watch = Watch(limit_s=course.time_limit_s)
 
     def record(load_step):
-        watch.beat(f"{load_step.force_n:.4g} N")
+        watch.report(f"{load_step.force_n:.4g} N")
         load_steps.append(load_step)
 
     def so_far(points):
@@ -240,7 +240,7 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
 
     def note(state: SlidingState) -> None:
         shell.refuse_motion(surface, state.position[:2], state.position[2] + lowest, lowest, step=len(seconds) + 1)
-        watch.beat(f"step {len(seconds) + 1} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
+        watch.report(f"step {len(seconds) + 1} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
         seconds.append(time.perf_counter() - start - sum(seconds))
 
     lowest = surface.first_touch_mm(spec.map_x_mm, spec.map_y_mm)

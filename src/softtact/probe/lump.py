@@ -28,10 +28,10 @@ from softtact.probe.sweep import palpate
 PARAMETERS = ("x_mm", "depth_mm", "log_ratio")
 _SURE = 0.95
 _STEP = 1e-3      # of a parameter's range, for differences of the spline
-_STARTS = 12      # best points of the table, where least squares start: two lumps may give almost the same readings
+_STARTS = 12      # best points of the table as starts of the least squares, because two lumps may give almost the same readings
 _AS_GOOD = chi2.ppf(_SURE, 1)      # largest excess in chi2 of another minimum that counts
 _LEAST_CHANGE = 1e-3      # smallest rise of stiffness in the map of detection
-_RATIOS = 200     # stiffness ratios that the map of detection tries
+_RATIOS = 200     # stiffness ratios tried in the map of detection
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class FoundLump:
 
 
 def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
-               tell: Callable[[str], None] = lambda text: None) -> LumpTable:
+               report: Callable[[str], None] = lambda text: None) -> LumpTable:
     """Solve all lumps of a search. The right half of the table is the mirror image, left and right film exchanged.
 
     A lump's forces are those of plain tissue plus the change by the lump on one mesh, which removes the effect of the mesh.
@@ -126,7 +126,7 @@ def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
     rows: list[np.ndarray] = []
     ratios = [1.0, *search.stiffness_ratio]
     for number, (x, depth) in enumerate(product(search.x, search.depth), start=1):
-        tell(f"place {number} of {len(search.x) * len(search.depth)} of a lump")
+        report(f"place {number} of {len(search.x) * len(search.depth)} of a lump")
         forces = np.array([_solved(design, search, x, depth, ratio, threads) for ratio in ratios])
         rows.append(plain + forces - forces[0])
     shape = (len(search.x), len(search.depth), len(ratios), len(search.jaw_mm), len(mirror))
@@ -223,7 +223,7 @@ def _noncentrality(readings):
 
 
 def recovery(design: PalpationDesign, search: LumpSearch, table: LumpTable, *, threads: int = 1,
-             tell: Callable[[str], None] = lambda text: None) -> pd.DataFrame:
+             report: Callable[[str], None] = lambda text: None) -> pd.DataFrame:
     """Random lumps within the table, solved, read with noise and estimated: the true and the found values of each.
 
     The readings come from the solver, not from the table, so they include the table's error. `alone_...`: found by the first press.
@@ -233,7 +233,7 @@ def recovery(design: PalpationDesign, search: LumpSearch, table: LumpTable, *, t
     low, high = table.low.copy(), table.high     # type: ignore[attr-defined]
     low[2] = np.log(search.stiffness_ratio[0])
     for number in range(search.trials):
-        tell(f"hidden lump {number + 1} of {search.trials}")
+        report(f"hidden lump {number + 1} of {search.trials}")
         lump = low + rng.uniform(0.1, 0.9, 3) * (high - low)
         changes = [_changed(design, search, lump + [move, 0, 0], threads) for move in search.moves]
         forces = table.plain_n + np.concatenate(changes)

@@ -109,7 +109,7 @@ def slope(force_n: np.ndarray, deflection_mm: np.ndarray) -> Slope:
 
 
 def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: Law | None = None, values: np.ndarray | None = None,
-            threads: int = 1, tell: Callable[[str], None] = lambda text: None) -> Palpation:
+            threads: int = 1, report: Callable[[str], None] = lambda text: None) -> Palpation:
     """Sweep the jaw over a tissue of a design by load (N) or displacement (mm).
 
     law: in place of the tissue's;  values: rising values at the ends of the steps, by default the design's
@@ -124,12 +124,12 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
     for change, value in zip(np.diff(values, prepend=0.0), values, strict=True):
         motion = motion.step(loads={"y": -float(value)}) if scenario == "load" else motion.step(ways={"y": -float(change)})
     rows, films, outside, state = [], [], [], None
-    for step in SolidPath(body, {JAW: motion}, tell=tell).run():
+    for step in SolidPath(body, {JAW: motion}, tell=report).run():
         state = step.state
         rows.append((-state.poses[0].translation[1], -step.loads[0, 1], -state.displacement[middle, 1]))
         films.append([reader.force_n(state.displacement) for reader in readers])
         outside.append(step.extrapolated_volume_fraction)
-        tell(f"{tissue}, {scenario}: step {len(rows)} of {len(values)}, {rows[-1][1]:.3g} N")
+        report(f"{tissue}, {scenario}: step {len(rows)} of {len(values)}, {rows[-1][1]:.3g} N")
     assert state is not None
     jaw, force, deflection = np.array(rows).T
     return Palpation(scenario, tissue, jaw, force, deflection, np.array(films), tuple(design.films), np.array(outside),
@@ -152,15 +152,15 @@ def apparent_modulus(force_n: np.ndarray, compression_mm: np.ndarray, *, height_
     return float(np.linalg.lstsq(terms, force_n, rcond=None)[0][0] * height_mm / area_mm2)
 
 
-def hardness_table(design: PalpationDesign, settings: Hardness, *, threads: int = 1, tell: Callable[[str], None] = lambda text: None
-                   ) -> pd.DataFrame:
+def hardness_table(design: PalpationDesign, settings: Hardness, *, threads: int = 1,
+                   report: Callable[[str], None] = lambda text: None) -> pd.DataFrame:
     """A row for each tissue, height and share of the jaw's displacement: the largest force, F/d there, and E_a."""
     rows = []
     for height in settings.tissue_heights:
         changed = design.with_(geometry={"tissue_height": height})
         values = np.linspace(0, design.displacement_mm.to, settings.steps + 1)[1:]
         for tissue in design.tissues:
-            sweep = palpate(changed, tissue, "displacement", values=values, threads=threads, tell=tell)
+            sweep = palpate(changed, tissue, "displacement", values=values, threads=threads, report=report)
             for share in settings.shares:
                 count = round(share * settings.steps)
                 force, deflection = sweep.force_n[:count], sweep.beam_deflection_mm[:count]
@@ -173,7 +173,7 @@ def hardness_table(design: PalpationDesign, settings: Hardness, *, threads: int 
 
 @dataclass(frozen=True)
 class HardnessVerdict:
-    """How far a measure of hardness is a property of the tissue, from a `hardness_table`."""
+    """Whether a measure of hardness is a property of the tissue alone, from a `hardness_table`."""
 
     change_with_load: float
     """Largest value over the least, less 1, of a tissue of one height; the worst of all."""

@@ -1,13 +1,13 @@
-"""Which files of the published archive lie in a folder, by their names, how its taxels lie, and how many maps it holds.
+"""Files of the published archive in a folder, the arrangement of its taxels, and its number of maps.
 
     {Flat|Curved}_{Real|Simulation}_{Abaqus|Isaac}[_variant].csv      Flat: indenters, Curved: grasped objects
 
-The names are those that the repository's viewer opens (Lab-CORO/TactileDataset, GUI.py 12-18). Files of the share carry endings
-(`_V1`, `_V2`, `_V1_Noise`) and write Isaac as `Issac` too, so a file is known by how its name begins.
+The names are those that the repository's viewer opens (Lab-CORO/TactileDataset, GUI.py 12-18). Files of the share have endings
+(`_V1`, `_V2`, `_V1_Noise`) and some write Isaac as `Issac`, so a file is recognised by the start of its name.
 
-Nobody states how tax1 to tax28 lie under the map, but a taxel is pressed where the map over it is deep. So the mean depth over each
-taxel's share of the map is correlated with the counts, for each of the eight orders that number a grid row by row or column by
-column from any corner; the right one correlates best.
+The arrangement of tax1 to tax28 under the map is not documented. It is inferred: the mean depth over each taxel's part of the map
+is correlated with the counts, for each of the eight orders that number a grid by rows or columns from any corner, and the order
+with the largest correlation is taken.
 """
 
 import re
@@ -28,7 +28,7 @@ MODELS = {"abaqus": "hyperelastic", "isaac": "elastic"}     # the paper's solver
 SPELLINGS = {"abaqus": "abaqus", "isaac": "isaac", "issac": "isaac"}
 _NAME = re.compile(r"(flat|curved)_(real|simulation)_(abaqus|isaac|issac)(?:_(.*))?", flags=re.IGNORECASE)
 ARRANGEMENTS = [f"{order}{flip}" for order in ("rows", "columns") for flip in ("", "_x", "_y", "_xy")]
-PRINTED = [  # what is counted, where it is printed, how many
+PRINTED = [  # quantity, source, printed number
     ("real maps", "abstract", 53400),
     ("real maps", "repository", 15400),
     ("maps of hyperelastic", "repository", 15400),
@@ -58,13 +58,13 @@ class ArchiveFile:
 
     @property
     def stands_for(self) -> tuple[str, str, str]:
-        """What a folder may hold only one file of."""
+        """The kind of file of which a folder may hold only one."""
         return self.set, self.kind, self.solver
 
 
 @dataclass(frozen=True)
 class Archive:
-    """The files that are read. real: {set: [file, ...]}, the first serves;  simulated: {model: {set: file}}."""
+    """The files to read. real: {set: [file, ...]}, of which the first is used;  simulated: {model: {set: file}}."""
 
     real: dict
     simulated: dict
@@ -85,9 +85,9 @@ def describe(path: Path) -> ArchiveFile | None:
 
 
 def find_archive(folder: str | Path, *, models: Sequence[str], variant: str | None = None) -> Archive:
-    """The `Archive` in a folder and those below it, with those of the `models` whose simulation files are there.
+    """The `Archive` in a folder and its subfolders, with those of the `models` that have simulation files.
 
-    variant: the ending of the files to read ("V1"); None: the only one that is there
+    variant: the ending of the files to read ("V1"); None: the only one that exists
     """
     files = _files_in(folder)
     chosen = {key: _choose(folder, [file for file in files if file.stands_for == key], variant)
@@ -108,7 +108,7 @@ def _files_in(folder):
 
 
 def _choose(folder, files, variant):
-    """The one file of its kind to be read: that of the `variant`, or else the only one, if it has no other ending."""
+    """The file to read of its kind: that of the `variant`, or the only one if it has no ending."""
     wanted = (variant or "").lower()
     matching = [file for file in files if file.variant.lower() == wanted] if variant is not None else files
     if not matching and len(files) == 1 and not files[0].variant:
@@ -117,7 +117,7 @@ def _choose(folder, files, variant):
         names = " and ".join(str(file.path.relative_to(folder)) for file in files)
         found = "are files of one kind" if len(files) > 1 else "is the only file of its kind"
         raise InputError(f"{folder}: {names} {found}; name the one to read by its ending in 'data.variant' "
-                         f"(it is {variant!r}), or take the others away.")
+                         f"(it is {variant!r}), or remove the others.")
     return matching[0]
 
 
@@ -133,7 +133,7 @@ def _check_complete(folder, real, simulated, models):
 
 
 def arrange(counts: np.ndarray, arrangement: str, *, shape: tuple[int, int]) -> np.ndarray:
-    """Counts (n, taxel) as tactile maps (n, row, column) of `shape`; `_x` and `_y`: numbered from the far end of that axis."""
+    """Counts (n, taxel) as tactile maps (n, row, column) of `shape`; `_x` and `_y`: numbered from the upper end of that axis."""
     order, _, flips = arrangement.partition("_")
     rows, columns = shape
     maps = counts.reshape(-1, rows, columns) if order == "rows" else counts.reshape(-1, columns, rows).swapaxes(1, 2)
@@ -141,15 +141,15 @@ def arrange(counts: np.ndarray, arrangement: str, *, shape: tuple[int, int]) -> 
 
 
 def taxel_depths(maps_mm: np.ndarray, *, shape: tuple[int, int]) -> np.ndarray:
-    """Mean of maps (n, y, x) over each taxel's share of the grid: (n, row, column)."""
+    """Mean of maps (n, y, x) over each taxel's part of the grid: (n, row, column)."""
     rows, columns = (np.array_split(np.arange(size), parts) for size, parts in zip(maps_mm.shape[1:], shape, strict=True))
     return np.stack([np.stack([maps_mm[:, r[:, None], c].mean(axis=(1, 2)) for c in columns], axis=-1) for r in rows], axis=1)
 
 
 def correlations(maps_mm: np.ndarray, counts: np.ndarray, *, shape: tuple[int, int]) -> dict[str, float]:
-    """{arrangement: correlation over the taxels of depth and counts, each less its mean over the map}.
+    """{arrangement: correlation over the taxels of depth and counts, each minus its mean over the map}.
 
-    maps_mm (n, y, x);  counts (n, taxel).  Without the means a strong press would correlate with any arrangement.
+    maps_mm (n, y, x);  counts (n, taxel).  Without that subtraction a strong press would correlate with any arrangement.
     """
     depth = _within(taxel_depths(maps_mm, shape=shape))
     return {name: _correlation(depth, _within(arrange(counts, name, shape=shape))) for name in ARRANGEMENTS}
@@ -164,13 +164,13 @@ def _correlation(a, b):
 
 
 def counts_table(found: dict[str, int]) -> pd.DataFrame:
-    """A row per printed count: what, where, printed, found, meets.  found {what: number}; what is not found was not there."""
+    """A row per printed count: what, where, printed, found, meets.  found {what: number}; a missing number means no file."""
     rows = [(what, where, printed, found.get(what), found.get(what) == printed) for what, where, printed in PRINTED]
     return pd.DataFrame(rows, columns=["what", "where", "printed", "found", "meets"])
 
 
 def counts_sentence(table: pd.DataFrame) -> str:
-    """Which of the three counts in print the archive meets."""
+    """One sentence on which of the three printed counts the archive meets."""
     verdicts = []
     for where, rows in table.groupby("where", sort=False):
         misses = [f"{row.what}: {row.printed} printed, {'no file' if pd.isna(row.found) else int(row.found)} found"

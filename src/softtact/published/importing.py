@@ -1,7 +1,7 @@
-"""The archive as the files that data sets are built from: per object, maps of each model and the readings that belong to them.
+"""Convert the archive to the files that data sets are built from: for each object, maps of each model and their readings.
 
-A test is one value of `Path`: one loading. Its k-th row among the real ones is the reading of its k-th map, 57 rows each, among the
-simulated ones. That is inferred (nobody states it), so it is tested: every test must have 57 simulated rows for each real one.
+A test is one value of `Path`, i.e. one loading. Its k-th row in the file of real readings belongs to its k-th map, of 57 rows, in
+the simulation's file. This is inferred, not documented, so it is checked: a test must have 57 simulated rows for each real one.
 """
 
 import re
@@ -18,8 +18,8 @@ from softtact.published.table import Outliers, Table, read_table
 from softtact.sensors.base import BaseSpec
 
 MAP_ROWS, MAP_COLUMNS, TAXELS = 57, 33, 28
-# Beyond these a test is left out. The layered sensor is 2.5 mm thick; counts run to 2400 in the paper's figures and the raw
-# converter's from 10,067 to 37,865 in a file of the share, so 5000 parts them; a sensor without load may read below zero.
+# A test outside these limits is left out. The layered sensor is 2.5 mm thick. Counts reach 2400 in the paper's figures, and raw
+# values of the converter in a file of the share are 10,067 to 37,865, so 5000 separates them; an unloaded sensor may read below 0.
 LARGEST_DEFORMATION_MM = 2.5
 COUNTS = (-240.0, 5000.0)
 PAPERS_COUNTS = 2400.0
@@ -27,8 +27,8 @@ FORCES_N = (-1.0, 75.0)     # the paper presses with 0 to 50 N
 SOLVERS = {model: solver.capitalize() for solver, model in MODELS.items()}
 COUNTED_AS = {"indenters": "real maps of indenters to train on", "unseen": "real maps of unseen indenters",
               "grasps": "real maps of objects"}
-SAMPLED = 500               # maps that the taxels' arrangement is judged on
-LEAST_DEPTH_MM = 0.005      # an archive without any deeper map is taken for one in metres
+SAMPLED = 500               # maps for the arrangement of the taxels
+LEAST_DEPTH_MM = 0.005      # an archive without any deeper map is probably in metres
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class PairedTest:
 
 
 def object_name(path: str) -> str:
-    """CircleG/... -> circle_g: the text before the first slash, in words that capitals and digits begin; '' if there is none."""
+    """The text before the first slash in snake_case, e.g. CircleG/... -> circle_g; '' if there is none."""
     text = re.split(r"[/\\]", path.strip(), maxsplit=1)[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])", "_", text)
     return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
@@ -51,7 +51,7 @@ def object_name(path: str) -> str:
 def pair(reals: Sequence[Table], simulated: dict[str, Table], *, outliers: Outliers) -> list[PairedTest]:
     """The usable `PairedTest`s of one set.
 
-    reals: tables of readings, of which the first serves and the others must agree;  simulated: {model: table}
+    reals: tables of readings, of which the first is used and the others must agree;  simulated: {model: table}
     """
     real, *others = reals
     tables = [real, *others, *simulated.values()]
@@ -98,7 +98,7 @@ def _check_readings(path, real, others, rows_of, outliers):
 
 
 def _alike(ours, theirs):
-    """Whether two columns or tables hold the same but for rounding."""
+    """Whether two columns or tables are equal up to rounding."""
     return ours.shape == theirs.shape and np.allclose(ours, theirs, rtol=1e-3, atol=1e-2, equal_nan=True)
 
 
@@ -115,7 +115,7 @@ def _check_maps(path, real, table, rows_of, outliers):
 
 
 def _check_common(path, table, rows, outliers):
-    """Numbers missing, too many fields, a test in several places."""
+    """Report missing numbers, surplus fields and a test whose rows are not contiguous."""
     bad = ~np.isfinite(table.values[rows])
     per_row = bad.any(axis=1)
     if per_row.any():
@@ -148,7 +148,7 @@ def _check_range(path, table, rows, values, limits, unit, outliers):
 
 @dataclass(frozen=True)
 class Tables:
-    """What was read. real {set: [table, ...]};  simulated {model: {set: table}};  tests {set: [PairedTest, ...]};  odd"""
+    """The tables read. real {set: [table, ...]};  simulated {model: {set: table}};  tests {set: [PairedTest, ...]};  outliers"""
 
     real: dict
     simulated: dict
@@ -156,7 +156,7 @@ class Tables:
     outliers: Outliers
 
     def maps_mm(self, model: str, set_name: str, test: PairedTest) -> np.ndarray:
-        """Maps (n, y, x) of a test, as the file has them."""
+        """Maps (n, y, x) of a test, as in the file."""
         return self.simulated[model][set_name].values[test.maps[model]].reshape(-1, MAP_ROWS, MAP_COLUMNS)
 
     def readings(self, set_name: str, test: PairedTest) -> np.ndarray:
@@ -164,7 +164,7 @@ class Tables:
         return self.real[set_name][0].values[test.readings]
 
     def paths(self) -> dict[str, list[str]]:
-        """All tests of a set, usable or not: {set: [path, ...]}."""
+        """All tests by set, usable or not: {set: [path, ...]}."""
         return {name: list(dict.fromkeys(path for table in self._of_set(name) for path in table.paths)) for name in SETS}
 
     def _of_set(self, name):
@@ -183,12 +183,12 @@ def read_archive(archive: Archive) -> Tables:
              for name in SETS}
     tests["curved"] = _only_grasped(tests, real["curved"][0], outliers)
     tables = Tables(real, simulated, tests, outliers)
-    tell_disorder(tables)
+    report_decreasing_readings(tables)
     return tables
 
 
-def tell_disorder(tables: Tables) -> None:
-    """Tell of tests whose readings fall where their maps deepen: perhaps the two do not match by order. They are kept."""
+def report_decreasing_readings(tables: Tables) -> None:
+    """Report tests whose readings fall while their maps deepen, so that their orders may differ. The tests are kept."""
     for model in tables.simulated:
         sign = sign_towards_pcb(tables, model)
         for name in SETS:
@@ -202,7 +202,7 @@ def tell_disorder(tables: Tables) -> None:
 
 
 def order_correlation(maps: np.ndarray, counts: np.ndarray) -> float:
-    """Correlation over a test's frames of the mean of the map (n, y, x) and of the counts (n, taxel); 1 for fewer than 3 frames."""
+    """Correlation over a test's frames of the means of map (n, y, x) and counts (n, taxel); 1 for fewer than 3 frames."""
     depth, count = maps.mean(axis=(1, 2), dtype=float), counts.mean(axis=1, dtype=float)
     if len(maps) < 3 or depth.std() == 0 or count.std() == 0:
         return 1.0
@@ -210,7 +210,7 @@ def order_correlation(maps: np.ndarray, counts: np.ndarray) -> float:
 
 
 def _only_grasped(tests, table, outliers):
-    """The grasps of objects that are not among the indenters too, which training sees."""
+    """The grasps of objects that are not also indenters, which the training includes."""
     indenters = {test.object for test in tests["flat"]}
     for test in tests["curved"]:
         if test.object in indenters:
@@ -222,7 +222,7 @@ def items_of(tables: Tables, *, unseen: Collection[str],
              without: Collection[str] = ()) -> dict[tuple[str, str], list[tuple[str, PairedTest]]]:
     """{(set, item): tests}: an item is an object with all its tests.
 
-    unseen: indenters that training must not see;  without: paths of tests, or objects, that are not used
+    unseen: indenters that the training must not include;  without: paths of tests, or objects, to leave out
     """
     _check_known(tables, without)
     known = sorted({test.object for test in tables.tests["flat"]})
@@ -249,7 +249,7 @@ def _check_known(tables, without):
 
 
 def sign_towards_pcb(tables: Tables, model: str) -> int:
-    """+1, or -1 where the archive's maps are mostly negative: ours are positive towards the PCB. Maps in metres are refused."""
+    """+1, or -1 if the maps are mostly negative; ours are positive towards the PCB. Raises InputError for maps in metres."""
     of_tests = [tables.maps_mm(model, name, test) for name in SETS for test in tables.tests[name]]
     deepest = max((float(np.abs(maps).max()) for maps in of_tests), default=0.0)
     if of_tests and deepest < LEAST_DEPTH_MM:
@@ -277,7 +277,7 @@ def judge_arrangement(tables: Tables, *, shape: tuple[int, int], seed: int) -> d
 
 def press_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[str, PairedTest]], *, model: str, sensor: BaseSpec,
                   sign: int) -> xarray.Dataset:
-    """Maps of one item and model as `simulate_press` would write them; `path` names each map's test."""
+    """Maps of one item and model in the form of `simulate_press`; `path` names the test of each map."""
     maps = sign * np.concatenate([tables.maps_mm(model, *test) for test in tests])
     ones = np.ones(len(maps), dtype=np.int8)
     return xarray.Dataset(
@@ -290,7 +290,7 @@ def press_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[st
 
 def tactile_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[str, PairedTest]], *, shape: tuple[int, int],
                     arrangement: str) -> xarray.Dataset:
-    """Readings of one item, one trial each: nothing in the archive states which readings repeat which."""
+    """Readings of one item, one trial each, because the archive does not state which readings are repetitions."""
     counts = np.concatenate([tables.readings(*test) for test in tests])
     return xarray.Dataset(
         {"tactile_map": (("trial", "force", "row", "column"), arrange(counts, arrangement, shape=shape)[None], {"units": "counts"}),
@@ -307,7 +307,7 @@ def _paths(tests):
 
 
 def found_counts(tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]]) -> dict[str, int]:
-    """{what: number} as `counts.PRINTED` names them: rows and maps in the files, and usable ones per set."""
+    """{what: number} by the names of `archive.PRINTED`: rows and maps in the files, and usable ones per set."""
     found = {"real maps": sum(len(tables.real[name][0].test) for name in SETS)}
     found |= {f"maps of {model}": sum(len(table.test) for table in of_set.values()) // MAP_ROWS
               for model, of_set in tables.simulated.items()}

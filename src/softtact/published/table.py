@@ -1,9 +1,9 @@
-"""One CSV of the archive as arrays: read in pieces, numbers as float32, a code for each test, never an object per cell.
+"""Read one CSV of the archive as arrays, in pieces, with numbers as float32 and a code for each test, to save memory.
 
-Encoding, separator, decimal sign and the order of the columns follow from the file. Names that end in rising numbers (`tax1` to
-`tax28`, `x0` to `x32`), or that are numbers themselves, order the values, wherever their columns are; a force has a name of its
-kind. A file whose names do not order its columns is refused, for a column in the place of another would shift every taxel in
-silence. Outliers are counted by file and row, with what was done about each.
+Encoding, separator, decimal sign and the order of the columns follow from the file. The numbers in the columns' names (`tax1` to
+`tax28`, `x0` to `x32`, or bare numbers) give the order of the values; the force has a name such as `force`. A file whose names do
+not order its columns is refused, because a wrong order would shift every taxel without notice. Outliers are counted by file and
+row, with the action taken for each.
 """
 
 import csv
@@ -20,16 +20,16 @@ import pandas as pd
 from softtact.errors import InputError
 from softtact.tables import encoding_of
 
-PIECE = 57 * 200    # rows read at a time: some 4 MB
-MOST_SURPLUS = 0.5      # share of rows with too many fields from which the file is not written as its header says
-TEXTS_KEPT = 1000   # words in place of numbers, for naming; one for each of the first rows that have them
+PIECE = 57 * 200    # rows read at a time: about 4 MB
+MOST_SURPLUS = 0.5      # share of rows with surplus fields above which the header does not describe the file
+TEXTS_KEPT = 1000   # most texts in place of numbers that are kept for messages, one for each of the first rows with one
 _PATH = "path"
-_ROW_NUMBERS = re.compile(r"(Unnamed: \d+)?")      # a nameless column, and pandas' name of one
+_ROW_NUMBERS = re.compile(r"(Unnamed: \d+)?")      # a column without a name, and pandas' name for it
 _UNIT = r"\s*(?:_(?P<suffix>n|kn|mn)|[\[(](?P<unit>.*)[\])])?"
 _FORCE = re.compile(r"((normal|contact|measured)?[ _]?(force|load)([ _]?z|[ _]normal)?|f[ _]?z?)" + _UNIT, flags=re.IGNORECASE)
 _NUMBERED = re.compile(r"(.*?)(\d+)")
 _NUMBER = re.compile(r"[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?")
-# 1,234 is a number with a decimal comma, or twelve hundred and thirty-four; 0,123 and 12,3456 are only the one.
+# 1,234 may have a decimal comma or a thousands separator; 0,123 and 12,3456 have a decimal comma.
 _MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
@@ -50,35 +50,35 @@ class Finding:
 
 
 class Outliers:
-    """The findings, as they come up."""
+    """The outliers of an archive, in the order found."""
 
     def __init__(self) -> None:
         self.findings: list[Finding] = []
 
     def leave_out(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
-        """A finding for which its test is not used."""
+        """Add an outlier whose test is not used."""
         self.findings.append(Finding(str(file), int(row), path, what, int(count), "left out"))
 
     def keep(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
-        """A finding that is only reported."""
+        """Add an outlier that is only reported."""
         self.findings.append(Finding(str(file), int(row), path, what, int(count), "kept"))
 
     def left_out(self) -> list[str]:
-        """The tests that are not used, in the order of their first finding."""
+        """The tests that are not used, in the order of their first outlier."""
         return list(dict.fromkeys(f.path for f in self.findings if f.done == "left out"))
 
     def leaves_out(self, path: str, *, files: Collection[str]) -> bool:
-        """Whether a test is not used for a finding in one of the files."""
+        """Whether a test is not used because of an outlier in one of the files."""
         return any(f.path == path and f.file in files and f.done == "left out" for f in self.findings)
 
     def table(self) -> pd.DataFrame:
-        """A row per finding."""
+        """A row per outlier."""
         return pd.DataFrame([asdict(f) for f in self.findings], columns=[field.name for field in fields(Finding)])
 
     def refuse(self, tests: int, *, outliers: str, largest_share: float) -> None:
-        """Refuse an archive that is odder than the user allows.
+        """Refuse an archive with more outliers than the user allows.
 
-        tests: how many there are;  outliers: leave_out or refuse;  largest_share: of tests that may be left out
+        tests: their number;  outliers: leave_out or refuse;  largest_share: of tests that may be left out
         """
         left = len(self.left_out())
         if left and (outliers == "refuse" or left > largest_share * tests):
@@ -116,13 +116,13 @@ class Table:
 
 
 def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Table:
-    """The `Table` of a file with `columns` values a row, and a force column where `force`; what is unusual goes to `outliers`."""
+    """The `Table` of a file with `columns` values a row, and a force column if `force`; irregularities are added to `outliers`."""
     codes: dict[str, int] = {}
     texts: dict[int, str] = {}
     pieces = []
     try:
         layout = read_layout(path, columns=columns, force=force, outliers=outliers)
-        with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):     # of fields beyond a surplus one
+        with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):     # about more than one surplus field
             for piece in _pieces(path, layout):
                 pieces.append(_arrays(piece, layout, codes, texts))
     except pd.errors.ParserError as error:
@@ -144,14 +144,14 @@ def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> 
 
 
 def _ends_with_a_line(path):
-    """Whether a file's last line has an end, so that its last number is whole."""
+    """Whether a file's last line is terminated, so that its last number is complete."""
     with open(path, "rb") as file:
         file.seek(-min(4, path.stat().st_size), os.SEEK_END)
         return b"\n" in (end := file.read()) or b"\r" in end
 
 
 def _pieces(path, layout):
-    # One column more than the header has: a surplus field is then seen, and shifts nothing. Blank lines count as lines.
+    # One column more than the header has, so that a surplus field is detected and shifts nothing. Blank lines count as lines.
     width = len(layout.columns)
     return pd.read_csv(path, sep=layout.separator, decimal=layout.decimal, header=None, skiprows=1, names=range(width + 1),
                        index_col=False, dtype={layout.path: str}, chunksize=PIECE, skip_blank_lines=False, low_memory=False,
@@ -159,7 +159,7 @@ def _pieces(path, layout):
 
 
 def _arrays(piece, layout, codes, texts):
-    """(values, force_n, test, line, surplus) of one piece; `codes` {path: test} and `texts` grow."""
+    """(values, force_n, test, line, surplus) of one piece; adds to `codes` {path: test} and `texts`."""
     surplus = piece[len(layout.columns)].notna().to_numpy()
     start = piece.index[0]
     piece = piece.drop(columns=len(layout.columns))
@@ -172,7 +172,7 @@ def _arrays(piece, layout, codes, texts):
 
 
 def _numbers(column, texts):
-    """A column as float64, nan where it holds no number; the text there is kept by its line."""
+    """A column as float64, nan for cells without a number, whose texts are kept by line."""
     if pd.api.types.is_numeric_dtype(column) and column.dtype != bool:
         return column.to_numpy(dtype=float)
     numbers = pd.to_numeric(column.astype(object), errors="coerce").to_numpy(dtype=float)
@@ -183,22 +183,23 @@ def _numbers(column, texts):
 
 def _codes(paths, codes):
     """Test (row,) of each row's path, numbered in the order of appearance; -1 where there is none."""
-    own, names = pd.factorize(paths)     # a path of blanks is none
+    code_in_piece, names = pd.factorize(paths)
+    # A path of blanks is "" here and counts as none.
     numbers = np.array([codes.setdefault(name, len(codes)) if name else -1 for name in names] + [-1], dtype=np.int32)
-    return numbers[own]
+    return numbers[code_in_piece]
 
 
 def _where_it_breaks(error):
-    """The parser's complaint, e.g. `Expected 35 fields in line 9, saw 40`."""
+    """The parser's message, e.g. `Expected 35 fields in line 9, saw 40`."""
     return str(error).rsplit("C error: ", 1)[-1].strip()
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a CSV is written.
+    """The format of a CSV.
 
-    encoding, separator, decimal;  columns: their names;  path, force: which is `Path`, and the force (or None)
-    numbers: which are values, in their order
+    encoding, separator, decimal;  columns: their names;  path, force: indices of `Path` and of the force (or None)
+    numbers: indices of the values in their order
     """
 
     encoding: str
@@ -211,7 +212,7 @@ class Layout:
 
 
 def read_layout(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Layout:
-    """The `Layout` of a file with `columns` values a row, and a force where `force`; other columns are refused."""
+    """The `Layout` of a file with `columns` values a row, and a force where `force`; raises InputError for other columns."""
     encoding = encoding_of(path)
     with open(path, encoding=encoding, newline="") as lines:
         header = lines.readline().rstrip("\r\n")
@@ -236,12 +237,12 @@ def read_layout(path: Path, *, columns: int, force: bool, outliers: Outliers) ->
 
 
 def _force_column(path, names, numbers):
-    """Which column holds the force in N: the one whose name says so."""
+    """Index of the column of the force in N, by its name."""
     forces = {k: _FORCE.fullmatch(names[k]) for k in numbers}
     named = [k for k, match in forces.items() if match]
     if len(named) != 1:
         raise InputError(f"{path}: {len(named)} columns are named as a force where one is needed (row 1 names "
-                         f"{', '.join(names[k] for k in numbers)[:100]} ...); name the one of the normal force 'force'.")
+                         f"{', '.join(names[k] for k in numbers)[:100]} ...); name the column of the normal force 'force'.")
     match = forces[named[0]]
     unit = (match["suffix"] or match["unit"] or "N").strip()
     if unit not in ("N", "n"):
@@ -250,10 +251,10 @@ def _force_column(path, names, numbers):
 
 
 def _in_order(path, names, numbers, outliers):
-    """The columns of values by the numbers in their names; another order in the file is reported."""
+    """The columns of values, ordered by the numbers in their names; another order in the file is reported."""
     order = _numbers_of([names[k] for k in numbers])
     if order is None:
-        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not tell the order of the columns; "
+        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not give the order of the columns; "
                          "name them with one word and numbers without a gap, such as tax1 to tax28 or x0 to x32.")
     ordered = [numbers[k] for k in sorted(range(len(numbers)), key=lambda k: order[k])]
     if ordered != numbers:
@@ -263,7 +264,7 @@ def _in_order(path, names, numbers, outliers):
 
 
 def _numbers_of(names):
-    """A number for each name, by which they are ordered; None where the names hold none."""
+    """A number for each name, by which they are ordered; None if the names have none."""
     if all(_NUMBER.fullmatch(name) for name in names):     # positions, or numbers without a word
         values = [float(name.replace(",", ".")) for name in names]
         return values if len(set(values)) == len(names) else None
@@ -275,7 +276,7 @@ def _numbers_of(names):
 
 
 def _decimal(path, encoding, separator, path_at):
-    """The decimal sign: that of the first number which has one, be it thousands of rows below."""
+    """The decimal sign: that of the first number which shows it, even thousands of rows below."""
     maybe = None
     for row, cell in _signs(path, encoding, separator, path_at):
         if "." in cell:
@@ -285,12 +286,12 @@ def _decimal(path, encoding, separator, path_at):
         maybe = maybe or (row, cell)
     if maybe is None:
         return "."
-    raise InputError(f"{path}, row {maybe[0]}: whether the comma of {maybe[1]!r} is a decimal one or of thousands is shown by no "
-                     "number of the file; write the numbers with decimal points.")
+    raise InputError(f"{path}, row {maybe[0]}: the comma of {maybe[1]!r} may be a decimal sign or a thousands separator, and no "
+                     "other number shows which; write the numbers with decimal points.")
 
 
 def _signs(path, encoding, separator, path_at) -> Iterator[tuple[int, str]]:
-    """(row, text) of the numbers with a point or a comma in them. A row with other fields than the header is left out."""
+    """(row, text) of the numbers that contain a point or a comma, without rows that have more or fewer fields than the header."""
     with open(path, encoding=encoding, newline="") as lines:
         width = None
         for row, cells in enumerate(csv.reader(lines, delimiter=separator), 1):

@@ -1,4 +1,4 @@
-"""The page of a calibration: estimates with deviations, residuals of each taxel, what the presses leave open."""
+"""The page of a calibration: estimates with standard deviations, residuals of each taxel, undetermined numbers."""
 
 import io
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[str] = (), advice: Sequence[Advice] = ()) -> None:
-    """Write the page of a calibration, its figures inside; notes: sentences on readings that were left out."""
+    """Write the page of a calibration with its figures inside; notes: sentences on readings that were left out."""
     problem = result.problem
     noise = np.mean([one.noise_counts for one in problem.experiments])
     page = Page("Calibration of a sensor", problem.presses.sensor.spec.name, folder=Path(path).parent)
@@ -43,14 +43,14 @@ def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[s
 
 
 def _advised(one):
-    """A row for a press that would help."""
+    """A row for an advised press."""
     return {"object": one.candidate.name, "place: x, y in mm, angle in degrees": ", ".join(map(str, one.candidate.place)),
             "up to, N": f"{one.largest_n:.3g}", "information, nats": f"{one.information:.2f}",
             "mean deviation of the gains afterwards": f"{100 * one.gain_deviation:.2f} %"}
 
 
 def _rows(result):
-    """(name, value, deviation) of the numbers that all taxels share."""
+    """(name, value, deviation) of the numbers common to all taxels, and of the range of the others."""
     scale, gain = result.linear.scale, result.linear.gain / result.linear.scale
     yield "common gain, counts at dC/C0 = 1", f"{scale:.1f}", f"{100 * result.deviation('ln scale'):.2f} %"
     yield ("gains over the common one, least to largest", f"{gain.min():.3f} to {gain.max():.3f}",
@@ -106,7 +106,7 @@ def draw_residuals(result: CalibrationResult) -> "Figure":
 
 
 def _residuals(result):
-    """Measured less calibrated counts (b, row, column) of each recording, 0 where a reading was left out."""
+    """Measured minus calibrated counts (b, row, column) of each recording, 0 for readings that were left out."""
     _, inverse = result.problem.stacked()
     ends = np.cumsum([len(one.counts) for one in result.problem.experiments])[:-1]
     return [np.where(used > 0, one.counts - counts, 0.0) for one, counts, used in

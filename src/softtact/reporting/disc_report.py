@@ -1,4 +1,4 @@
-"""The discs of a user's camera frames: one table, an annotated picture of each frame, a summary."""
+"""The discs of a user's camera frames: a table, an annotated picture of each frame, and a summary."""
 
 import itertools
 import os
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-COLOURS = {"whole": "#3fd0ff", "touching": "#ffb000", "clipped": "#ff4d6d"}   # differ in brightness, and for the colour-blind
-MOST_NUMBERS = 200   # discs; more numbers than that hide each other
+COLOURS = {"whole": "#3fd0ff", "touching": "#ffb000", "clipped": "#ff4d6d"}   # distinct in grey and for the colour-blind
+MOST_NUMBERS = 200   # discs; more numbers would overlap
 _WIDEST = 9.0        # inches
 
 
@@ -71,7 +71,7 @@ def _draw_numbers(axes, table, kinds):
 
 
 def _draw_scale(axes, sides):
-    """A scale bar of a round length near a fifth of the width, above the frame's upper right corner."""
+    """Draw a scale bar of a round length near a fifth of the width, above the frame's upper right corner."""
     length = _round(0.2 * sides[0])
     y = -0.5 * sides[1] - 0.015 * sides.max()
     axes.plot([sides[0] / 2 - length, sides[0] / 2], [y, y], color="black", linewidth=3, solid_capstyle="butt", clip_on=False)
@@ -80,7 +80,7 @@ def _draw_scale(axes, sides):
 
 
 def _round(length):
-    """The largest of 1, 2 or 5 times a power of ten up to a length."""
+    """The largest of 1, 2 or 5 times a power of ten that is not above a length."""
     power = 10.0 ** np.floor(np.log10(length))
     return max(factor * power for factor in (1, 2, 5) if factor * power <= length)
 
@@ -95,9 +95,9 @@ def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | N
                  every: int = 1, transfer: str | None = None) -> dict[str, Any]:
     """Write the table `out` (CSV) of all discs in the frames of a file or folder and their pictures; return the summary.
 
-    picture: None for none; a PNG for a single frame, a folder for several; without an ending it becomes the one that fits
-    transfer: from values to light, see `softtact.imaging.light.grey`; None is linear, with a warning where a file states another
-    The summary's warnings: {sentence: [names of frames]}
+    picture: a PNG for a single frame, a folder for several, or None; a name without an ending suits both
+    transfer: from values to light, see `softtact.imaging.light.grey`; None is linear, with a warning if a file states another
+    The summary's warnings are {sentence: [names of frames]}.
     """
     warned: dict[str, list[str]] = {}
     stream = _collecting(read_frames(frames, every=every), warned, encoding=transfer is None)
@@ -118,7 +118,7 @@ def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | N
 
 
 def _collecting(frames, warned, *, encoding):
-    """The pairs (name, frame); their readers' warnings go to `warned`, those on the values' encoding only if asked for."""
+    """The pairs (name, frame). Warnings of their readers are added to `warned`, those on the encoding only if `encoding`."""
     while True:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", FrameWarning)
@@ -130,7 +130,7 @@ def _collecting(frames, warned, *, encoding):
 
 
 def _detect(name, frame, warned, **how):
-    """Table and outlines of one frame; warnings go to `warned`."""
+    """Table and outlines of one frame; warnings are added to `warned`."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FrameWarning)
         try:
@@ -143,7 +143,7 @@ def _detect(name, frame, warned, **how):
 
 
 def _keep_warnings(warned, caught, name):
-    """Add a frame to the warnings {sentence: [frames]}; warnings of other kinds are issued."""
+    """Add a frame to the warnings {sentence: [frames]}; warnings of other kinds are issued again."""
     for warning in caught:
         if issubclass(warning.category, FrameWarning):
             warned.setdefault(str(warning.message), []).append(name)
@@ -152,7 +152,7 @@ def _keep_warnings(warned, caught, name):
 
 
 def _row(name, table):
-    """A frame's line of the summary."""
+    """The summary of a frame."""
     return {"frame": name, "discs": len(table), "mean_area_mm2": float(table.area_mm2.mean()) if len(table) else None,
             "total_area_mm2": float(table.area_mm2.sum()), "clipped": int(table.clipped.sum()),
             "touching": int(table.touching.sum())}
@@ -166,9 +166,9 @@ def _picture_path(picture, *, single):
     if single:
         return picture if picture.suffix.lower() == ".png" else picture.with_name(f"{picture.name}.png")
     if picture.suffix.lower() == ".png":
-        raise InputError(f"{picture}: there are several frames, each with its picture; give --picture a folder.")
+        raise InputError(f"{picture}: there are several frames, with a picture each; give --picture a folder.")
     if picture.is_file():
-        raise InputError(f"{picture}: is a file where the folder of the pictures goes; give --picture another name.")
+        raise InputError(f"{picture}: it is a file, but several pictures need a folder; give --picture another name.")
     return picture
 
 
@@ -178,17 +178,17 @@ def _refuse_overwriting(frames, out, target):
     folder = target is not None and target.is_dir()
     refuse_overwriting(files, {"--out": Path(out), "--picture": None if folder else target})
     if folder and len(files) > 1 and target.samefile(files[0].parent):
-        raise InputError(f"--picture {target}: it is the folder of the frames, which would be lost; choose another.")
+        raise InputError(f"--picture {target}: it is the folder of the frames, which would be overwritten; choose another.")
 
 
 def _file_name(name):
-    """A picture's file name: the frame's, with its ending, since a.png and a.tif may lie side by side."""
+    """A picture's file name: the frame's with its ending, since a.png and a.tif may be in one folder."""
     return f"{name.replace(':', '_')}.png" if ":" in name or not name.lower().endswith(".png") else name
 
 
 @contextmanager
 def _pictures(target):
-    """A temporary folder whose pictures move to the target at the end; None where there is no target."""
+    """A temporary folder whose pictures move to the target at the end; None without a target."""
     if target is None:
         yield None
         return

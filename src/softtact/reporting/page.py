@@ -1,4 +1,4 @@
-"""A report as one HTML file: boxes, figures, tables and claims, each with links to its files; figures are inside."""
+"""A report as one HTML file with boxes, figures, tables and claims, each with links to its files; figures are embedded."""
 
 import base64
 import os
@@ -15,7 +15,7 @@ from softtact.reporting.run_record import machine
 from softtact.reporting.words import header
 
 Links = Sequence[tuple[str, Sequence[tuple[str, str]]]]
-"""Groups of links: what they lead to ("" says nothing), and (text, address) of each."""
+"""Groups of links: a label ("" for none), and (text, address) of each link."""
 
 _MOST_LINKS = 4      # of a group below a figure; the others are folded
 _STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
@@ -74,9 +74,9 @@ _TEMPLATE = Environment(autoescape=True, trim_blocks=True).from_string("""
 
 
 class Page:
-    """A report whose parts stand in the order in which they are added; a part without content is left out.
+    """A report with parts in the order in which they are added; a part without content is left out.
 
-    title, name: of the heading, the name in italics;  folder: where the page will lie, from which links lead to files
+    title, name: of the heading, the name in italics;  folder: of the page, to which links are relative
     """
 
     def __init__(self, title: str, name: str, *, folder: str | Path) -> None:
@@ -85,22 +85,22 @@ class Page:
         self._other_pages: list[tuple[str, str]] = []
 
     def link(self, path: str | Path) -> str:
-        """The address of a file as seen from the page."""
+        """The address of a file relative to the page."""
         return os.path.relpath(path, self.folder)
 
     def text(self, text: str, *, links: Links = ()) -> None:
-        """A paragraph, its links behind it."""
+        """A paragraph, followed by its links."""
         if text or links:
             self._add("text", text=text, links=links)
 
     def box(self, title: str, text: str | Iterable[str]) -> None:
-        """A paragraph, or a list of sentences, that must not be overlooked."""
+        """A highlighted paragraph or list of sentences."""
         whole, sentences = (text, []) if isinstance(text, str) else ("", list(text))
         if whole or sentences:
             self._add("box", title=title, text=whole, sentences=sentences)
 
     def section(self, title: str, *, anchor: str | None = None) -> None:
-        """The heading of what follows, which the navigation leads to by its first word if not by an anchor."""
+        """A heading with a link in the navigation; its anchor is by default its first word."""
         self._add("section", title=title, anchor=anchor or title.split()[0].lower())
 
     def other_page(self, text: str, address: str) -> None:
@@ -110,7 +110,7 @@ class Page:
     def figure(self, source: Path | bytes, caption: str, *, remark: str = "", links: Links = ()) -> None:
         """A picture inside the page: a PNG, as bytes or as a file with its SVG beside it, or a file of HTML.
 
-        caption: below it, and read in its place to who does not see it;  remark: what follows below
+        caption: below the picture, and its alternative text;  remark: after the caption
         """
         about = {"caption": caption, "remark": remark}
         if isinstance(source, bytes):
@@ -134,14 +134,14 @@ class Page:
             self.figure(path, caption)
 
     def tables(self, titles: Mapping[str, str], files: Mapping[str, Path], *, most_rows: int | None = None) -> None:
-        """The section of a study's tables: of {name: title} those among the files {name: CSV}, each with its first rows."""
+        """The section of a study's tables: those of {name: title} with a file in {name: CSV}, each with its first rows."""
         self.section("Tables")
         for name, title in titles.items():
             if name in files:
                 self.table(pd.read_csv(files[name]).iloc[:most_rows], title, file=files[name])
 
     def claims(self, claims: pd.DataFrame, *, title: str = "The paper's claims", file: str | Path, links: Links = ()) -> None:
-        """The section of a study's claims by `evaluation.claim_rows`, coloured by their verdicts, linked to their evidence."""
+        """The section of a study's claims (see `evaluation.claim_rows`), coloured by verdict, with links to their evidence."""
         counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
         self.section(title, anchor="claims")
         self.text(f"Each verdict is computed by the rule beside it: {len(claims)} claims, {counts}.",
@@ -153,7 +153,7 @@ class Page:
         self._add("claims", columns=list(claims.columns), rows=rows)
 
     def code(self, text: str, *, title: str = "") -> None:
-        """A text as it is, such as a configuration or a program; the title is its anchor, too."""
+        """A preformatted text, such as a configuration or a program; the title is also its anchor."""
         self._add("code", text=text, title=title, anchor=title)
 
     def render(self) -> str:
@@ -167,7 +167,7 @@ class Page:
                                 most=_MOST_LINKS, version=softtact.__version__, machine=machine())
 
     def write(self, path: str | Path) -> None:
-        """Write the page whole, or not at all."""
+        """Write the page, completely or not at all."""
         text = self.render()
         with atomic_path(path) as temporary:
             temporary.write_text(text, encoding="utf-8")

@@ -1,5 +1,4 @@
-"""A press to look at from all sides: its surface, or the outside of its solids, at each step, as a page that turns or as a
-picture."""
+"""A view of a press: its surface, or the outside of its solids, at each step, as an interactive page or as a picture."""
 
 import html
 import re
@@ -20,7 +19,7 @@ from softtact.reporting.view3d import html_view
 
 UNIT, UNIT_OF_SOLIDS = "displacement towards the PCB (mm)", "displacement (mm)"
 _STEP = re.compile(r"displacement_mm_step(\d+)")
-_EYE = (-0.9, -1.35, 1.0)     # from where a picture looks
+_EYE = (-0.9, -1.35, 1.0)     # direction from the body to the eye in a picture
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{title}</title><style>
 body {{font: 16px system-ui, sans-serif; max-width: 1400px; margin: 1em auto; padding: 0 1em}}
@@ -28,13 +27,13 @@ figure {{margin: 0}}
 </style><body>{body}</body></html>
 """
 _SEEN_THROUGH = 0.3           # opacity of the object
-_SHEET_MM = 1.0               # height of the walls where a file does not hold the sensor's thickness
+_SHEET_MM = 1.0               # height of the walls if a file does not state the sensor's thickness
 
 
 @dataclass(frozen=True)
 class PressView:
     """points_mm (l, n, 3) as pressed, triangles (m, 3) of the sensor, values (l, n): displacement towards the PCB in mm, nan at the
-    object's points;  labels: forces;  object_triangles (k, 3): none where the file does not hold the object;  unit: of the values
+    object's points;  labels: forces;  object_triangles (k, 3): empty if the file does not contain the object;  unit: of the values
     """
 
     points_mm: np.ndarray
@@ -75,7 +74,7 @@ def _of_mesh(path, mesh):
 
 
 def _whole(path, view):
-    """The view, where all of its points are finite."""
+    """The view, after a check that all of its points are finite."""
     if not np.isfinite(view.points_mm).all():
         raise InputError(f"{path}: some displacements are not finite numbers; press again.")
     return view
@@ -89,11 +88,11 @@ def _of_result(path):
 
 
 def _of_solids_vtu(path):
-    """The view of a mesh of solids that `PressResult.write_vtu` wrote."""
+    """The view of a mesh of solids from `PressResult.write_vtu`."""
     mesh, point_data = read_mesh_file(path), meshio.vtu.read(path).point_data
     steps = sorted((int(match[1]), name) for name in point_data if (match := _STEP.fullmatch(name)))
     if not steps:
-        raise InputError(f"{path}: it holds a mesh and no displacements of it; give a file of PressResult.write_vtu.")
+        raise InputError(f"{path}: it has a mesh but no displacements; give a file of PressResult.write_vtu.")
     moved = np.stack([point_data[name] for _, name in steps]).astype(float)
     return _of_solids(path, mesh, moved, np.zeros((len(moved), 0, 3)), np.zeros((0, 3), int))
 
@@ -112,7 +111,7 @@ def _mesh_of_map(path, data):
     """The `PressedMesh` of a file's map."""
     missing = [name for name in ("deformation_map_mm", "normal_force_n", "x", "y") if name not in data.variables]
     if missing:
-        raise InputError(f"{path}: it holds no {missing[0]!r}, so it is no press; give the file of softtact press --out.")
+        raise InputError(f"{path}: it has no {missing[0]!r}, so it is not a press; give the file of softtact press --out.")
     if data["deformation_map_mm"].dims != ("step", "y", "x"):
         raise InputError(f"{path}: the map has the dimensions {data['deformation_map_mm'].dims} and not step, y, x; press again.")
     mesh = of_map(data["deformation_map_mm"].values, data["x"].values, data["y"].values, data["normal_force_n"].values,
@@ -122,7 +121,7 @@ def _mesh_of_map(path, data):
 
 
 def write_page(view: PressView, path: str | Path) -> None:
-    """Write a page that shows the press and needs nothing else."""
+    """Write a self-contained page that shows the press."""
     triangles = np.vstack([view.triangles, view.object_triangles])
     body = html_view(view.points_mm, triangles, view.values, title=view.title, unit=view.unit, labels=view.labels,
                      see_through=len(view.object_triangles))
@@ -131,7 +130,7 @@ def write_page(view: PressView, path: str | Path) -> None:
 
 
 def save_picture(view: PressView, path: str | Path) -> str:
-    """Draw the press at its largest force to PNG; returns what drew it: pyvista where it is installed, else matplotlib."""
+    """Draw the press at its largest force as PNG; return the renderer's name: pyvista if it is installed, else matplotlib."""
     try:
         import pyvista
     except ImportError:
@@ -144,7 +143,7 @@ def save_picture(view: PressView, path: str | Path) -> str:
 def _draw_with_pyvista(pyvista, view, path):
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)     # it warns where there is no screen, and draws all the same
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)     # without a screen it warns, but draws
     surface, solid = (pyvista.PolyData(view.points_mm[-1], np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
                       for triangles in (view.triangles, view.object_triangles))
     plotter = pyvista.Plotter(off_screen=True, window_size=(1200, 900))
@@ -160,7 +159,7 @@ def _draw_with_pyvista(pyvista, view, path):
     plotter.enable_parallel_projection()
     plotter.view_vector(_EYE)
     plotter.camera.zoom(0.9)
-    plotter.camera.SetWindowCenter(0.0, -0.2)     # the colour bar stands below
+    plotter.camera.SetWindowCenter(0.0, -0.2)     # leaves space for the colour bar below
     with atomic_path(path) as temporary:
         plotter.screenshot(temporary)
     plotter.close()
@@ -175,7 +174,8 @@ def _draw_with_matplotlib(view, path):
     figure, axes = plt.subplots(figsize=(9, 7), subplot_kw={"projection": "3d"}, layout="constrained")
     points = view.points_mm[-1]
     a, b, c = points[view.triangles].transpose(1, 0, 2)
-    triangles = view.triangles[np.cross(b - a, c - a) @ _EYE > 0]     # matplotlib would draw far sides over near ones
+    # Only front sides, because matplotlib would draw back sides over them.
+    triangles = view.triangles[np.cross(b - a, c - a) @ _EYE > 0]
     values = view.values[-1][triangles].mean(axis=1)
     drawn = axes.plot_trisurf(*points.T, triangles=triangles, linewidth=0, antialiased=False)
     limits = Normalize(values.min(), values.max())

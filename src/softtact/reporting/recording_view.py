@@ -1,4 +1,4 @@
-"""A recording of a TSF-85 as a strip of pictures or a video: both fingers' taxels, and sums of counts and force over time."""
+"""A recording of a TSF-85 as a strip of pictures or a video: taxels of both fingers, sums of counts, and force over time."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -21,12 +21,12 @@ _RATE_HZ, _MOST_FRAMES = 20, 600     # of a video in real time; a longer one pla
 
 
 def save_strip(recording: "xarray.Dataset", path: str | Path) -> None:
-    """Write a PNG: sums of counts (and force, where known) over time above, the taxels at six times below, one row a finger."""
+    """Write a PNG: sums of counts (and force if known) over time, and below the taxels at six times, one row per finger."""
     save(draw_strip(recording), path)
 
 
 def draw_strip(recording: "xarray.Dataset") -> "Figure":
-    """The figure of `save_strip`. Its times: the largest sum of counts, and five spread evenly over the recording."""
+    """The figure of `save_strip`, at the time of the largest sum of counts and five times spread evenly over the recording."""
     time, counts = recording.time.values, recording.counts.values
     peak = int(np.abs(counts).sum(axis=(2, 3)).max(axis=1).argmax())
     shown = sorted({peak, *(int(np.abs(time - at).argmin()) for at in np.linspace(time[0], time[-1], _FRAMES))})
@@ -47,7 +47,7 @@ def draw_strip(recording: "xarray.Dataset") -> "Figure":
 
 
 def save_video(recording: "xarray.Dataset", path: str | Path) -> None:
-    """Write a GIF or an MP4 (extra `optics`) that plays a recording in real time, or faster where it is longer than 30 s."""
+    """Write a GIF or an MP4 (extra `optics`) that plays a recording in real time, or faster if it is longer than 30 s."""
     path = Path(path)
     write = {".gif": _write_gif, ".mp4": _write_mp4}[path.suffix.lower()]
     if write is _write_mp4 and importlib.util.find_spec("av") is None:
@@ -57,7 +57,7 @@ def save_video(recording: "xarray.Dataset", path: str | Path) -> None:
 
 
 def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
-    """Pictures (height, width, 3) of a recording, even numbers of pixels, as videos need them."""
+    """Pictures (height, width, 3) of a recording, with even numbers of pixels for video codecs."""
     time, counts = recording.time.values, recording.counts.values
     number = int(np.clip(_RATE_HZ * (time[-1] - time[0]), 1, _MOST_FRAMES))
     fingers, limits = counts.shape[1], _limits(counts)
@@ -71,7 +71,7 @@ def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
     figure.colorbar(images[-1], ax=axes, label="counts over the baseline", shrink=0.8)
     figure.suptitle(_label(recording, 0), fontsize=9)
     figure.canvas.draw()
-    figure.set_layout_engine("none")      # keep the layout: a new one would take a second for each frame
+    figure.set_layout_engine("none")      # keep the layout, because a new one takes a second per frame
     for at in np.linspace(time[0], time[-1], number):
         reading = int(np.abs(time - at).argmin())
         for finger, image in enumerate(images):
@@ -112,12 +112,12 @@ def _label(recording, reading):
     time = f"{recording.time.values[reading]:.2f} s"
     if "force_n" not in recording:
         return time
-    forces = dict.fromkeys(f"{force:.3g}" for force in recording.force_n.values[reading])     # once for both
+    forces = dict.fromkeys(f"{force:.3g}" for force in recording.force_n.values[reading])     # equal forces appear once
     return f"{time}\n{' and '.join(forces)} N"
 
 
 def _draw_time(axis, recording, marked):
-    """Draw sums of counts and, where known, the force over time; return the lines that mark some times (n,)."""
+    """Draw sums of counts and, if known, the force over time; return the lines that mark the times (n,)."""
     time = recording.time.values
     for finger in range(recording.sizes["finger"]):
         axis.plot(time, recording.counts.values[:, finger].sum(axis=(1, 2)), color=_COLOURS[finger], lw=1, label=f"finger {finger}")

@@ -1,7 +1,7 @@
-"""Views of solids for figures: rendered off screen by VTK, or drawn by matplotlib where that fails.
+"""Views of solids for figures: rendered off screen by VTK, or drawn by matplotlib if that fails.
 
-VTK needs some OpenGL (its wheels bring a software one). A driver that fails may end the process or never answer, so VTK runs in a
-process of its own, `python -m softtact.reporting.render FOLDER`, with a limit of time. Log and figure name the renderer.
+VTK needs OpenGL (its wheels include a software renderer). A driver that fails may crash the process or hang, so VTK runs in a
+separate process, `python -m softtact.reporting.render FOLDER`, with a time limit. Log and figure name the renderer.
 """
 
 import json
@@ -55,7 +55,7 @@ def part_of(mesh: "trimesh.Trimesh", **look: Any) -> Part:
 
 
 def rendered(views: Sequence[View], *, size: tuple[int, int] = (900, 675), timeout_s: float = TIMEOUT_S) -> list[np.ndarray] | None:
-    """Images (h, w, 3) of the views in 0 to 255, or None where rendering failed, after a sentence in the log."""
+    """Images (h, w, 3) of the views, 0 to 255, or None if rendering failed, with a sentence on stderr."""
     with tempfile.TemporaryDirectory(prefix="softtact-render-") as folder:
         _write(views, size, Path(folder))
         images = drawn_apart(_COMMAND, Path(folder), sentence=FALLBACK, timeout_s=timeout_s)
@@ -76,7 +76,7 @@ def _write(views, size, folder):
 
 
 def add_view(figure: "Figure", place: "SubplotSpec", view: View, image: np.ndarray | None) -> "Axes":
-    """Axes at a place of a grid with the image, or with the view drawn by matplotlib where there is no image."""
+    """Axes in a grid cell with the image, or with the view drawn by matplotlib if there is no image."""
     if image is None:
         axes = figure.add_subplot(place, projection="3d")
         _draw(axes, view)
@@ -87,14 +87,14 @@ def add_view(figure: "Figure", place: "SubplotSpec", view: View, image: np.ndarr
     return axes
 
 
-def tell_fallback(figure: "Figure", images: list[np.ndarray] | None) -> None:
-    """A line under the figure where its views were drawn by matplotlib."""
+def note_fallback(figure: "Figure", images: list[np.ndarray] | None) -> None:
+    """Add a line under the figure if its views were drawn by matplotlib."""
     if images is None:
         figure.text(0.005, 0.002, FALLBACK, fontsize=6, color="0.4", ha="left", va="bottom")
 
 
 def _cropped(image, margin=8):
-    """The image with its white border cut to a margin."""
+    """The image with its white border cropped to a margin."""
     rows, columns = (np.flatnonzero((image < 250).any(axis=(1 - axis, 2))) for axis in (0, 1))
     if not len(rows):
         return image
@@ -120,7 +120,7 @@ def _draw(axes, view):
 
 
 def _shaded(corners, part):
-    """Colours (m, 4) of facets (m, 3, 3), lighter towards a light from above."""
+    """Colours (m, 4) of facets (m, 3, 3), lighter towards a light source above."""
     from matplotlib.colors import to_rgb
 
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

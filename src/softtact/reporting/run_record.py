@@ -11,9 +11,9 @@ COLUMNS = ["stage", "jobs", "total_s", "mean_s", "longest_s", "largest_memory_mb
 
 
 def run_record(folder: str | Path) -> pd.DataFrame:
-    """A row for each stage with a benchmark below `folder`, and one of all: seconds of wall time, memory in MB.
+    """A row for each stage with a benchmark below `folder`, and one for all: seconds of wall time, memory in MB.
 
-    Each job counts once, by its last run, also where that was an earlier run of the workflow. The report's job is left out.
+    Each job counts with its last run, even if that was in an earlier run of the workflow. The report's job is left out.
     """
     rows = []
     for stage in sorted(path for path in Path(folder).glob("*") if path.is_dir() and path.name != "report"):
@@ -29,7 +29,7 @@ def run_record(folder: str | Path) -> pd.DataFrame:
 
 
 def run_sentence(record: pd.DataFrame) -> str:
-    """The record in words, with the machine."""
+    """The record in sentences, with the machine."""
     where = f"The report was made on {machine()}; {os.cpu_count()} processors."
     if not len(record):
         return f"No job has left a benchmark. {where}"
@@ -47,7 +47,7 @@ def _row(stage, seconds, memory):
 
 
 def _read(path):
-    """A benchmark's seconds and memory. A very short job has no memory; one that was killed while it wrote has no row."""
+    """Seconds and memory of a benchmark. A very short job has no memory, and one killed while it wrote the file has no row."""
     if not path.stat().st_size:
         return pd.DataFrame({"s": [], "max_rss": []})
     frame = pd.read_csv(path, sep="\t", na_values=["NA", "-"])

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-# Dark blue, light orange and a green between, which differ in grey, too.
+# Dark blue, light orange and a green between them, which are distinct in grey, too.
 MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
 MODEL_NAMES = {name: name for name in MODEL_COLOURS}
 ARCHITECTURE_LINES = {"printed": "-", "searched": "-.", "compact": "--"}
@@ -32,7 +32,7 @@ def pyplot() -> ModuleType:
 
 
 def colour(model: str) -> str:
-    """A model's colour; grey where none is listed."""
+    """A model's colour; grey for an unlisted model."""
     return MODEL_COLOURS.get(model, "0.4")
 
 
@@ -42,7 +42,7 @@ def ssim_label(ssim: dict[str, Any] | None) -> str:
 
 
 def save(figure: "Figure", *paths: str | Path) -> None:
-    """Write a figure to PNG and SVG files, complete or not at all; the same figure gives the same bytes."""
+    """Write a figure as PNG and SVG files, completely or not at all; equal figures give equal bytes."""
     plt = pyplot()
     for path in map(Path, paths):
         kind = path.suffix[1:]

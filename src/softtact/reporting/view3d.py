@@ -1,7 +1,7 @@
-"""A coloured surface that turns in a browser: one self-contained piece of HTML, without a network, a library or a graphics card.
+"""An interactive view of a coloured surface: self-contained HTML that needs no network, library or graphics card.
 
-Its script draws the triangles into a depth buffer. So nested surfaces are right in every browser, and a page may hold any number of
-views; browsers allow only few WebGL contexts.
+Its script draws the triangles into a depth buffer. So nested surfaces are drawn correctly in every browser, and a page may have
+any number of views, whereas browsers allow only few WebGL contexts.
 """
 
 import base64
@@ -189,19 +189,19 @@ class ColourScale:
     limits: tuple[float, float] | None = None
     """Values at the ends of the scale; by default the lowest and the highest."""
     map_name: str = "viridis"
-    """Of matplotlib's colour map."""
+    """Name of matplotlib's colour map."""
 
 
 def html_view(points_mm: np.ndarray, triangles: np.ndarray, values: np.ndarray, *, title: str, unit: str,
               labels: Sequence[str] | None = None, scale: ColourScale = ColourScale(), see_through: int = 0) -> str:
-    """A piece of HTML, a <figure> with its script: the surface turns by mouse, touch and arrow keys, and zooms.
+    """HTML of a <figure> with its script: the surface turns by mouse, touch and arrow keys, and zooms.
 
     points_mm: (n, 3), z upwards, or (states, n, 3) with a slider for the states
     triangles: (m, 3) indices of points, visible from both sides
-    values: (n,) or (states, n) in `unit`, which stands at the colour bar; nan is grey
-    labels: names of the states at the slider;  see_through: number of the last triangles that are the object: they are drawn
-    see-through and can be hidden
-    A page may hold several views. It loads nothing and works from a file.
+    values: (n,) or (states, n) in `unit`, the label of the colour bar; nan is grey
+    labels: names of the states at the slider;  see_through: number of triangles at the end that belong to the object, which is
+    drawn transparent and can be hidden
+    A page may have several views. It loads nothing and works from a file.
     """
     points, triangles, values = _checked(points_mm, triangles, values)
     labels = [str(label) for label in labels] if labels is not None else [""] * max(len(points), len(values))
@@ -217,7 +217,7 @@ def html_view(points_mm: np.ndarray, triangles: np.ndarray, values: np.ndarray, 
 
 
 def _checked(points, triangles, values):
-    """Arrays (states, n, 3), (m, 3) and (states, n) that fit each other."""
+    """Arrays (states, n, 3), (m, 3) and (states, n), checked for consistency."""
     points, values = (np.asarray(array, dtype=float) for array in (points, values))
     points, values = points.reshape(-1, *points.shape[-2:]), values.reshape(-1, values.shape[-1])
     triangles = np.asarray(triangles)
@@ -228,12 +228,12 @@ def _checked(points, triangles, values):
     if len({len(points), len(values), 1}) > 2:
         raise InputError(f"A view's points have {len(points)} states and its values {len(values)}; give one, or as many of each.")
     if not np.isfinite(points).all() or (triangles.size and not 0 <= triangles.min() <= triangles.max() < count):
-        raise InputError("A view's points must be finite, and its triangles be made of them.")
+        raise InputError("A view's points must be finite, and its triangles must refer to them.")
     return points, triangles, values
 
 
 def _limits(values):
-    """Lowest and highest finite value; 0 and 1 where there is none."""
+    """Lowest and highest finite value; 0 and 1 if there is none."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     return low, high if high > low else low + 1.0
@@ -244,7 +244,7 @@ def _packed(array, kind):
 
 
 def _json(data):
-    """JSON that cannot end the script that it stands in."""
+    """JSON in which no text can end the surrounding script."""
     return json.dumps(data).replace("<", "\\u003c")
 
 
@@ -258,7 +258,7 @@ def _colours(map_name, count=256):
 def _bar(low, high, unit, map_name):
     """The colour bar, with the values at its ends and its middle."""
     stops = ",".join("rgb({:.0f},{:.0f},{:.0f})".format(*colour) for colour in _colours(map_name, 17))
-    smallest = 1e-6 * (high - low)     # below, it is round-off and reads as 0
+    smallest = 1e-6 * (high - low)     # smaller numbers are round-off and shown as 0
     ticks = [value if abs(value) > smallest else 0.0 for value in (low, (low + high) / 2, high)]
     numbers = "".join(f"<span>{value:.{_DIGITS}g}</span>" for value in ticks)
     return (f'<div class="view3d-bar" style="max-width:420px;font:13px system-ui,sans-serif"><div style="height:12px;'

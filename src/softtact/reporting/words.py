@@ -1,4 +1,4 @@
-"""Headings of columns, names of predictors and sets in the reports, in place of the names in files."""
+"""Headings of columns and names of predictors and sets in reports, in place of the names in files."""
 
 from softtact.evaluation.score_tables import ALL_FORCES
 
@@ -47,7 +47,7 @@ HEADERS = {
 
 
 def header(column: str) -> str:
-    """A column's heading; one that is not listed, like a law or a force, gets its unit and spaces for underscores."""
+    """A column's heading; an unlisted name, such as a law or a force, gets its unit and spaces for underscores."""
     if column in HEADERS:
         return HEADERS[column]
     for start, words in (("mae_share_", "mean error over the mean reading, "), ("ssim_", "SSIM, "), ("mae_counts_",
@@ -65,5 +65,5 @@ def _plain(name):
 
 
 def force_in_words(force: str) -> str:
-    """A force of a `score_table`."""
+    """A force of a `score_table` in words."""
     return "all forces" if force == ALL_FORCES else f"{force} N"

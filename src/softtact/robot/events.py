@@ -1,7 +1,7 @@
-"""A grasp's record without MuJoCo, and the presses of the true mesh on both sensors at its events, kept in `events.nc`.
+"""The record of a grasp, and the presses of the true mesh on both sensors at its events; stored in `events.nc`, without MuJoCo.
 
-A press takes from the record the object's pose in the sensor's frame, the normal force and, where asked for, the shear force. So a
-file that is pressed again (`press_events` of `record_of`) gives the same maps. A press with shear solves for the tangential
+A press uses the object's pose in the sensor's frame, the normal force and optionally the shear force of the record. So the presses
+of a stored record (`press_events` of `record_of`) give the same maps. A press with shear solves for the tangential
 displacement at which friction carries the shear.
 """
 
@@ -147,18 +147,18 @@ class EventMaps:
     pressed_force_n: np.ndarray
     """(event, finger) in N: normal force that the model found on the sensing surface and the shell."""
     pressed_shear_n: np.ndarray
-    """(event, finger, 2) in N: shear along x and y in the press; zero where none was asked for."""
+    """(event, finger, 2) in N: shear along x and y in the press; zero for presses without shear."""
     model: np.ndarray
     """(event, finger): model of the press, or `none`."""
     selection_reason: np.ndarray
-    """(event, finger): why this model."""
+    """(event, finger): reason for this model."""
     within_validity: np.ndarray
     """(event, finger): 0 where the press is outside the model's validity."""
 
 
 def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *, model: str = "auto", workers: int | None = None,
                  label: str = "grasp", friction: float | None = None, **options: Any) -> EventMaps:
-    """Press the mesh on both sensors at each event of a record, by the model that is named or, with `auto`, chosen.
+    """Press the mesh on both sensors at each event of a record, with the named model or, for `auto`, a chosen one.
 
     friction: Coulomb's coefficient of the object on the sensors. With it the record's shear forces above 10 mN are pressed, too;
         the model must then be named, elastic or hyperelastic
@@ -250,6 +250,6 @@ def read_events(path: str | Path) -> "xarray.Dataset":
 
 
 def record_of(data: "xarray.Dataset") -> GraspRecord:
-    """The `GraspRecord` in the data set of an `events.nc`, to the bit."""
+    """The `GraspRecord` in the data set of an `events.nc`, with identical bits."""
     arrays = {one.name: data[one.name].values for one in fields(GraspRecord)}
     return GraspRecord(**arrays | {"contact": arrays["contact"].astype(bool)})

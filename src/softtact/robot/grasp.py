@@ -15,7 +15,7 @@ from softtact.robot.events import FINGERS, PHASES, GraspRecord
 from softtact.robot.scene import DOWN, MM, Scene, quaternion, start
 
 _APPROACH_S, _DESCENT_S, _SETTLE_S = 1.0, 0.5, 0.3
-_BESIDE_MM = 1.0              # between object and pad, where the fingers begin to close slowly
+_BESIDE_MM = 1.0              # between object and pad, from which the fingers close slowly
 _WAYPOINTS = 9                # of a straight vertical path; between them joints move in proportion
 _CLOSED_M = -0.1              # target of the fingers' servos under force control: far inside, so the force limit acts
 _LONGEST_S = 5.0              # limit of time in which a grip must become steady

@@ -1,8 +1,8 @@
 """Pictures of a grasp: the robot drawn off screen by MuJoCo, beside maps and counts of both sensors.
 
-MuJoCo needs EGL (on Debian libegl1, libegl-mesa0 and libgl1-mesa-dri). A driver that fails may end its process, so the robot is
-drawn in another process, `python -m softtact.robot.offscreen FOLDER`. Where that fails, a sentence says so and there is no picture
-of the robot.
+MuJoCo needs EGL (on Debian libegl1, libegl-mesa0 and libgl1-mesa-dri). A driver that fails may crash its process, so the robot is
+drawn in another process, `python -m softtact.robot.offscreen FOLDER`. If that fails, a sentence on stderr reports it, and there is
+no picture of the robot.
 """
 
 import os
@@ -33,7 +33,7 @@ _NO_PICTURE = "no picture of the robot: MuJoCo does not draw off screen here"
 
 def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: tuple[float, float, float] = CLOSE,
               size: tuple[int, int] = (480, 640), timeout_s: float = 120.0) -> np.ndarray | None:
-    """Images (row, height, width, 3) of rows of a record, or None, with a sentence on stderr, where nothing can be drawn.
+    """Images (row, height, width, 3) of rows of a record, or None, with a sentence on stderr, if MuJoCo cannot draw.
 
     view: azimuth and elevation in degrees, distance in m, towards the hand or, beyond 1 m, the middle of the arm
     """

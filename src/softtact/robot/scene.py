@@ -1,7 +1,7 @@
 """The scene of a grasp in MuJoCo: arm, gripper, a sensor on both fingers, and the object in a fixture.
 
 Frames. Tool: z points out of the hand, x from the left finger to the right one. Sensor: z out of the pad towards the object, y
-along its long side, from the fingertip to the palm. In the left sensor's frame the object's mesh stands as `Sensor.press` places it
+along its long side, from the fingertip to the palm. In the left sensor's frame the object's mesh lies as `Sensor.press` places it
 by default, its bounding box centred, then shifted by (x, y) and rotated about z. So its lower side touches the left sensor, and its
 upper side the right one.
 
@@ -34,7 +34,7 @@ SENSOR_IN_TOOL = {"left": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.
 _PAD_TIME_S, _FIXTURE_TIME_S = 0.004, 0.004     # time constants of MuJoCo's contacts and welds, at least two time steps
 # Of contacts: stiffness grows with the lighter body's mass, and 0.3 g must still bear 50 N between the pads.
 _STIFF = (0.99, 0.9999, 0.0001, 0.5, 2.0)
-_RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)      # holds an object's weight within nanometres
+_RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)      # moves by nanometres under an object's weight
 _TURNING = 10.0                 # weight of rotations in a weld: 20 N at 5 mm from the middle tilt an object by 0.03 mrad
 _TORSION_M = 0.005            # radius of the patch that resists torsion: pads are soft, hulls touch in points
 _FINGER_N_PER_M, _FINGER_NS_PER_M, _FINGER_KG = 2e4, 120.0, 0.1
@@ -46,7 +46,7 @@ _NEEDED = {"joint": (*JOINTS, "finger_left", "finger_right"), "actuator": (*JOIN
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the object stands between the pads, in the left sensor's frame."""
+    """Placement of the object between the pads, in the left sensor's frame."""
 
     x_mm: float = 0.0
     """Of the middle of its bounding box, along the sensor's short side."""
@@ -201,7 +201,7 @@ def _add_object(robot, mesh, settings, placement, mass):
 
 
 def _object_in_sensor(mesh, placement):
-    """(translation (3,) in mm, Rotation) of the mesh in the left sensor's frame, were that in the middle of the grip."""
+    """(translation (3,) in mm, Rotation) of the mesh in the left sensor's frame, moved to the middle of the grip."""
     turn = Rotation.from_euler("z", placement.angle_deg, degrees=True)
     centre = mesh.bounds.mean(axis=0)
     return np.array([placement.x_mm, placement.y_mm, 0.0]) - turn.apply(centre), turn

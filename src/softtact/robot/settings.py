@@ -1,6 +1,6 @@
-"""Settings of a scene, as a YAML file states them, and of MuJoCo's import.
+"""Settings of a scene from a YAML file, and the import of MuJoCo.
 
-`softtact/robot/data/scene.yaml` ships; a user's file states some of its keys.
+The defaults are in `softtact/robot/data/scene.yaml`; a user's file states some of its keys.
 """
 
 import os
@@ -20,7 +20,7 @@ _Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
 class SceneSettings(FiniteSection):
-    """The keys of a scene file. Reasons of what is assumed stand in the file."""
+    """The keys of a scene file. The default file gives the reasons of assumed values."""
 
     mjcf: Path | None = None
     """A user's robot, or None for the UR10 and gripper of this package."""
@@ -57,7 +57,7 @@ class SceneSettings(FiniteSection):
 
 
 def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
-    """The shipped `SceneSettings`, with the values that a user's YAML file states.
+    """The default `SceneSettings`, with the values of a user's YAML file.
 
     changes: values by name, in place of the file's;  a relative `mjcf` is found beside its file
     Raises InputError that names file, field and value.
@@ -81,9 +81,9 @@ def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo with its graphics off in this process; pictures are drawn in another one (`softtact.robot.offscreen`).
+    """Import MuJoCo without graphics in this process; pictures are drawn in another one (`softtact.robot.offscreen`).
 
-    A broken driver that MUJOCO_GL names would otherwise end the import, and with it the physics.
+    Otherwise a broken driver in MUJOCO_GL would make the import, and so the physics, fail.
     """
     wanted = os.environ.get("MUJOCO_GL")
     os.environ["MUJOCO_GL"] = "disable"

@@ -1,4 +1,4 @@
-"""Readings of a sensor for a loop of a hundred calls a second: each place is pressed once, and its maps are kept.
+"""Readings of a sensor for a loop with a hundred calls per second: each place is pressed once, and its maps are cached.
 
 A place is the object's x and y in the sensor's frame and its rotation about z, on a grid. At a new place the true mesh is pressed
 with several forces at once; between two forces its maps are interpolated (`Ladder`).
@@ -35,9 +35,9 @@ _SENSE = (1.0, -1.0)
 _FORCES = 5              # of the ladder
 STEP_MM = 2.0            # of the grid of places: as exact in the elastic model as 1 mm
 _STEP_DEG = 2.0          # of the grid of rotations, which hardly change while a hand slides
-_SURFACES = 8            # undersides that are kept: some MB each of a fine mesh
+_SURFACES = 8            # most cached undersides: some MB each for a fine mesh
 _AT_PLACE = 0.02         # of a step along x: nearer to a place, its map is taken alone
-_MOST = 2.0              # largest factor of a moved map: beyond, the object is hardly over the sensor
+_MOST = 2.0              # largest factor of a moved map; beyond it the object is hardly over the sensor
 
 
 @dataclass

@@ -21,7 +21,7 @@ from softtact.skin.layout import Layout
 from softtact.skin.loads import Load, disc, refuse_beside
 
 _LARGE_STRAIN = 0.3     # of the thickness: the papers' elastomers were tested up to it
-_RATIOS = 6             # of pressure to modulus that are solved for a curve, at the extremes of a Chebyshev polynomial
+_RATIOS = 6             # ratios of pressure to modulus solved for a curve, at the extrema of a Chebyshev polynomial
 _DEFORMATION_MESHES = {"coarse": (1.5, 2), "standard": (1.0, 4), "fine": (0.75, 5)}     # spacing in mm, layers
 _FIELD_MESHES = {
     "coarse": (1, (0.5, 1.0)),
@@ -97,7 +97,7 @@ CONVERTERS = {
 
 @dataclass(frozen=True)
 class LayerMeshSizes:
-    """Sizes of both meshes of a skin; `mesh_convergence` shows the error that they leave."""
+    """Sizes of both meshes of a skin; `mesh_convergence` shows their error."""
 
     spacing_mm: float = 1.0
     """Of the mesh for the deformation, in the plane."""
@@ -133,7 +133,7 @@ class Readings:
 
 
 class Skin:
-    """A layer of elastomer on taxels. Meshes and factors are made once and serve every load."""
+    """A layer of elastomer on taxels. Meshes and factorisations are computed once for all loads."""
 
     def __init__(self, layout: Layout, *, thickness_mm: float, poisson: float, permittivity: float,
                  mesh: LayerMeshSizes = LayerMeshSizes(), threads: int = 1) -> None:
@@ -205,7 +205,7 @@ def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converte
 
 
 def alone(layout: Layout, taxel: int) -> Layout:
-    """The same elastomer with one taxel (counted from 0); the others become a part of the guard, which is driven with it."""
+    """The same elastomer with one taxel (counted from 0); the others become part of the guard, which has the same potential."""
     return Layout(layout.outline_mm, layout.centres_mm[[taxel]], layout.module[[taxel]], layout.corners_mm, layout.radius_mm,
                   layout.guard_radius_mm)
 

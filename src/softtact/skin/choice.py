@@ -1,4 +1,4 @@
-"""Which elastomer, how thick, and which taxels: the papers' criteria, the thinnest layer that meets all needs, and a full search.
+"""The choice of elastomer, thickness and taxels: the papers' criteria, the thinnest layer that meets all needs, a full search.
 
 Le, Maiolino, Mastrogiovanni and Cannata, sec. III-B: sensitivity S, eq. (5), against weight W, eq. (8).
 """
@@ -20,8 +20,8 @@ from softtact.skin.maps import TaxelLayer, crosstalk
 
 FACTORS = ("elastomer", "thickness_mm", "radius_mm", "pitch_mm")
 OUTPUTS = ("counts_at_smallest_force", "strain", "crosstalk", "weight_g_module")
-SPECIMEN_MM = 6.0  # thickness of the tested specimens, which the printed t_min is a share of: the authors' published toolbox
-_SKINS = 8  # skins kept with their factors: one for each thickness of a table, for the next elastomer
+SPECIMEN_MM = 6.0  # thickness of the tested specimens, to which the printed t_min is relative: the authors' published toolbox
+_SKINS = 8  # skins cached with their factorisations: one for each thickness of a table, for the next elastomer
 
 
 def printed_criteria(elastomers: Sequence[Elastomer], *, stress_mpa: float, area_mm2: float) -> pd.DataFrame:
@@ -41,7 +41,7 @@ def printed_criteria(elastomers: Sequence[Elastomer], *, stress_mpa: float, area
 
 
 def pareto(sensitivity: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Which choices (..., n) no other dominates: none is as sensitive and as light, and better in one of both."""
+    """Whether each choice (..., n) is Pareto optimal: no other is at least as sensitive and light, and better in one of both."""
     s, w = np.asarray(sensitivity)[..., None, :], np.asarray(weight)[..., None, :]
     row_s, row_w = np.swapaxes(s, -1, -2), np.swapaxes(w, -1, -2)
     dominated = (s >= row_s) & (w <= row_w) & ((s > row_s) | (w < row_w))
@@ -124,7 +124,7 @@ def thinnest(table: pd.DataFrame) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Values of which `search` takes all combinations, and the sizes that all have."""
+    """Values that `search` combines, and the common sizes."""
 
     thicknesses_mm: Sequence[float]
     """Of the elastomer."""
@@ -184,7 +184,7 @@ def main_effects(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _layer_row(elastomer, thickness, layout, needs, converter, spacing):
-    """A row of `thickness_table`, but for the budget of weight."""
+    """A row of `thickness_table` without the budget of weight."""
     area = np.pi * needs.probe_mm**2 / 4
     small, large = min(needs.smallest_force_n / area, needs.range_mpa[0]), needs.range_mpa[1]
     cell = _UnitCell(layout.corners_mm[0].tobytes(), layout.radius_mm, layout.guard_radius_mm, thickness, elastomer.poisson,
@@ -214,7 +214,7 @@ def _with_budget(table, weight_budget_g):
 
 @dataclass(frozen=True)
 class _UnitCell:
-    """A module with one taxel in its middle and a probe over it; lengths in mm. All that its meshes and factors depend on."""
+    """A module with one taxel in its middle and a probe over it, lengths in mm: all inputs of its meshes and factorisations."""
 
     corners: bytes
     """(3, 2) of the module, as the array's bytes, so that the cell can be a key."""

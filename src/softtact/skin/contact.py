@@ -1,7 +1,7 @@
-"""A rigid object pressed on the skin: where it touches, and with which forces.
+"""A rigid object pressed on the skin: area and forces of contact.
 
-At small strains the layer has one modulus, and contact is without friction. At finite strains the solid model takes a foam's law
-that follows the elastomer's curve. The papers assume a uniform pressure instead.
+At small strains the layer has one modulus, and contact is without friction. At finite strains the solid model uses the law of a
+foam fitted to the elastomer's curve. The papers assume a uniform pressure instead.
 """
 
 import warnings
@@ -29,7 +29,7 @@ from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
 
 _DEPTHS = (0.15, 0.3, 0.6)  # of the thickness: candidates for contact lie at most so far below the object's lowest point
-_BLOCK = 200  # columns of the compliance that are solved together
+_BLOCK = 200  # columns of the compliance solved together
 _GUESS_MPA = 0.1
 _ITERATIONS, _TOLERANCE = 20, 1e-3  # of the secant modulus, which depends on the pressure
 _OBJECT, _LAYER = "object", "elastomer"

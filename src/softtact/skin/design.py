@@ -1,4 +1,4 @@
-"""A skin's design as its YAML file describes it, and its checks before any work begins."""
+"""A skin's design from its YAML file, and its checks before any computation."""
 
 import dataclasses
 import warnings
@@ -236,12 +236,12 @@ def check_design(values: Mapping[str, Any], path: str | Path) -> SkinDesign:
     names = [load.name for load in design.loads]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError(f"{path}, at 'loads': two loads are called {twice!r}; give each its own name.")
+        raise InputError(f"{path}, at 'loads': two loads are called {twice!r}; give them different names.")
     return design
 
 
 def _fault(fault):
-    """The sentence on a fault of pydantic's, from the field on."""
+    """The message on a fault found by pydantic, without the file's name."""
     *parents, last = fault["loc"] or ("",)
     at = f", at {'.'.join(map(str, fault['loc']))!r}"
     if fault["type"] == "extra_forbidden":
@@ -255,7 +255,7 @@ def _fault(fault):
 
 @dataclass
 class PreparedDesign:
-    """A design whose names are resolved to layout, materials, converter and loads; all is checked."""
+    """A checked design with its names resolved to layout, materials, converter and loads."""
 
     design: SkinDesign
     where: str
@@ -269,7 +269,7 @@ class PreparedDesign:
 
 
 def prepare(design: SkinDesign, path: Path) -> PreparedDesign:
-    """Resolve and check a design, as far as that takes no time; the first fault is an InputError."""
+    """Resolve and check a design, without long computations; raises InputError for the first fault."""
     where, layout, folder = str(path), design.layout(), path.parent
     elastomers = read_elastomers(folder / design.elastomers if design.elastomers else None)
     elastomer = find_elastomer(design.elastomer, elastomers, where=f"{where}, at 'elastomer'")

@@ -15,7 +15,7 @@ from softtact.skin.loads import Load
 
 
 class BondedLayer:
-    """A layer of one Poisson's ratio, factored once for every load and modulus.
+    """A layer of one Poisson's ratio, factorised once for all loads and moduli.
 
     Displacements are inversely proportional to Young's modulus, so stiffness and factors are those of 1 MPa.
     """

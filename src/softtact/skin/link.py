@@ -1,6 +1,6 @@
-"""Modules laid on a robot's link side by side, and their taxels for other programs.
+"""Modules placed side by side on a robot's link, and their taxels for other programs.
 
-Modules are laid from a start along straightest geodesics (Polthier and Schmies, Straightest Geodesics, 1998). On a cylinder or a
+Modules are placed from a start along straightest geodesics (Polthier and Schmies, Straightest Geodesics, 1998). On a cylinder or a
 cone the flat tiling closes without gaps. On a surface that bends in two directions it cannot: gaps or overlaps appear between
 modules that were reached along different paths.
 """
@@ -24,7 +24,7 @@ _PARALLEL = 1e-12  # inner product below which a path runs along an edge
 _MOST_FACES = 100_000
 _NEAR = 0.9  # of the distance between neighbours' middles: a module that is nearer to another is left out
 _NO_BEND = 1e-9
-_SHARES = (1.0, 0.4)  # of the paths to the corners: long ones smooth over facets, short ones see sharp bends
+_SHARES = (1.0, 0.4)  # of the paths to the corners: long ones smooth over facets, short ones detect sharp bends
 _M = 1e-3  # metres in a millimetre: all three formats are in metres
 _SHARP = np.cos(np.radians(40.0))  # beyond this angle between facets an edge belongs to the body, like a lid's
 

@@ -1,4 +1,4 @@
-"""Run one stage on files, as the workflow does.
+"""Run one stage on files, like the workflow.
 
 Example:
     python -m softtact.studies hybrid.fit_material --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{...}'
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument("stage", metavar="NAME",
                         help="KIND.NAME, a stage of a kind of study named as the workflow's rule; of the hybrid study NAME alone")
     parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
-                        help="an input file; the same name again, or NAME[]=PATH, makes a list")
+                        help="an input file; a repeated name, or NAME[]=PATH, makes a list")
     parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH",
                         help="an output file; lists as for --in")
     parser.add_argument("--settings", default="{}", metavar="JSON", help="the values that the stage uses")
@@ -57,14 +57,14 @@ def run_stage(options: argparse.Namespace) -> None:
 
 
 class _Named(dict):
-    """{name: path or list of paths}; a stage that asks for one that was not given is answered with what to give."""
+    """{name: path or list of paths}; a missing name raises an InputError that names the option."""
 
     def __init__(self, option, paths):
         super().__init__(paths)
         self.option = option
 
     def __missing__(self, name):
-        raise InputError(f"{self.option} {name}=PATH is missing, which this stage needs; give it.")
+        raise InputError(f"{self.option} {name}=PATH is missing; this stage needs it.")
 
 
 def _named_paths(pairs, *, option):
@@ -82,7 +82,7 @@ def _named_paths(pairs, *, option):
 
 
 def _flat(named):
-    """(--out NAME, path) of each path, the lists' paths numbered."""
+    """(--out NAME, path) of each path, numbered in lists."""
     for name, paths in named.items():
         for k, path in enumerate(paths if isinstance(paths, list) else [paths]):
             yield f"--out {name}{f'[{k}]' * isinstance(paths, list)}", path

@@ -1,7 +1,7 @@
-"""Which source files a stage runs: its static imports inside `src/`, followed to the end.
+"""The source files that a stage runs: the transitive closure of its static imports inside `src/`.
 
-Snakemake does not notice an edit inside an imported package. So every rule names the closure of its stage as an input,
-and an edit reruns just the stages that import the edited file. A study that runs without Snakemake keeps the closure's hash.
+Snakemake does not notice an edit inside an imported package. So every rule lists the closure of its stage as an input, and an
+edit reruns just the stages that import the edited file. A study that runs without Snakemake stores the closure's hash.
 """
 
 import ast
@@ -15,10 +15,10 @@ _FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 
 
 def code_closure(stage: str, *, source: str | Path = "src") -> list[str]:
-    """Sorted paths of a stage's file and of everything of its package below `source` that it imports, directly or not.
+    """Sorted paths of a stage's file and of all files of its package below `source` that it imports, directly or indirectly.
 
-    stage: `module`, or `module:function`, of which the function's imports count, those of the module's functions that it
-        calls, and those at the module's level
+    stage: `module`, or `module:function`, for which the imports of the function count, those of the module's functions that it
+        calls, and those at module level
     """
     module, _, function = stage.partition(":")
     source = Path(source)
@@ -35,7 +35,7 @@ def code_closure(stage: str, *, source: str | Path = "src") -> list[str]:
 
 
 def code_digest(stage: str, *, source: str | Path = "src") -> str:
-    """Hash of the names and the contents of a stage's closure: of an installed package as of a project's `src/`."""
+    """Hash of the names and contents of a stage's closure, the same for an installed package and a project's `src/`."""
     source = Path(source)
     found = sha256()
     for path in code_closure(stage, source=source):
@@ -50,7 +50,7 @@ def _content_digest(path: str) -> str:
 
 @cache
 def _reached(file: str, source: Path, function: str = "") -> list[str]:
-    """Files of its package that a file imports. Found once: the closures of a workflow's rules have most files in common."""
+    """Files of its package that a file imports. Cached, because the closures of a workflow's rules share most files."""
     path = Path(file)
     text, package, reached = path.read_text(encoding="utf-8"), path.relative_to(source).parts[0], []
     for node in _imports_of_function(text, function) if function else _imports_of_file(text, path):
@@ -64,15 +64,15 @@ def _reached(file: str, source: Path, function: str = "") -> list[str]:
 
 
 def _imports_of_file(text: str, path: Path) -> list[Import]:
-    """The import statements that an import of the file may come to run.
+    """The import statements that an import of the file may run.
 
-    A package's functions import late and for its users only; its module level is what everyone runs.
+    In a package's `__init__.py` only those at module level, since its functions import lazily for users.
     """
     return _imports(_run(ast.parse(text).body, into_functions=path.name != "__init__.py"))
 
 
 def _imports_of_function(text: str, name: str) -> list[Import]:
-    """The import statements at a module's level, in a function of it, and in the module's functions and classes that this uses."""
+    """The import statements at module level, in a function of the module, and in its functions and classes that this uses."""
     tree = ast.parse(text)
     defined = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
     used: dict[str, ast.AST] = {}
@@ -90,7 +90,7 @@ def _imports(nodes: Iterable[ast.AST]) -> list[Import]:
 
 
 def _run(nodes: Iterable[ast.AST], *, into_functions: bool = True) -> Iterator[ast.AST]:
-    """The nodes and all below them; what stands under `if TYPE_CHECKING:` is never run."""
+    """The nodes and all below them, without those under `if TYPE_CHECKING:`, which never run."""
     for node in nodes:
         yield node
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
@@ -102,8 +102,8 @@ def _run(nodes: Iterable[ast.AST], *, into_functions: bool = True) -> Iterator[a
 def _file_of_name(package: str, name: str, source: Path) -> Path | None:
     """The file that `from package import name` runs: the submodule `name`, or else the package's file.
 
-    A package whose submodule is imported has its `__init__.py` left out: those files are empty here, and would tie
-    every stage to every package.
+    The `__init__.py` of a package whose submodule is imported is left out: these files are empty here, and would make every
+    stage depend on every package.
     """
     return _file(f"{package}.{name}", source) or _file(package, source)
 

@@ -1,4 +1,4 @@
-"""Reading a study's configuration; what is wrong with one, in a sentence that names the field, the value and the remedy."""
+"""Read and check a study's configuration; an error message names the field, the value and the remedy."""
 
 from collections.abc import Collection
 from importlib import resources
@@ -17,7 +17,7 @@ _Checked = TypeVar("_Checked", bound=BaseModel)
 
 
 def here_or_shipped(path: str | Path) -> Path:
-    """A file as it is named or, where the working folder has no such file below config/, the one that ships with the package."""
+    """The named file or, if the working folder has no such file below config/, the one that ships with the package."""
     path = Path(path)
     if path.exists() or path.parts[:1] != ("config",):
         return path
@@ -26,7 +26,7 @@ def here_or_shipped(path: str | Path) -> Path:
 
 
 def read_mapping(path: str | Path) -> dict[str, Any]:
-    """The keys and values of a configuration file; what holds none is refused."""
+    """The keys and values of a configuration file. Raises InputError if it has none."""
     missing = "there is no such configuration; give the path of one, from the project's folder."
     values = read_yaml(here_or_shipped(path), missing=missing)
     if not isinstance(values, dict):
@@ -35,7 +35,7 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
 
 
 def validated(model: type[_Checked], values: object, *, where: str) -> _Checked:
-    """`model` from plain values; the first fault becomes an `InputError` naming the field and the remedy."""
+    """`model` from plain values; raises an InputError with the field and the remedy for the first fault."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -43,7 +43,7 @@ def validated(model: type[_Checked], values: object, *, where: str) -> _Checked:
 
 
 def _fault_sentence(model, fault, *, where):
-    """One sentence for a fault of pydantic's."""
+    """One sentence on a fault found by pydantic."""
     *parents, last = fault["loc"] or ("",)
     section = f"{where}, at {'.'.join(map(str, parents))!r}" if parents else where
     if fault["type"] == "missing":
@@ -56,11 +56,11 @@ def _fault_sentence(model, fault, *, where):
 
 
 def refuse_unknown(name: str, known: Collection[str], *, kind: str, where: str) -> None:
-    """Raise an `InputError` that names the nearest right one if `name` is not among the `known` ones."""
+    """Raise an `InputError` with the nearest known name if `name` is not one of the `known`."""
     if name not in known:
         raise InputError(_sentence(f"{where}: {unknown(name, known, kind=kind)}"))
 
 
 def _sentence(text):
-    """The text with an end."""
+    """The text as a sentence."""
     return text if text.endswith(("?", ".")) else f"{text}."

@@ -1,7 +1,7 @@
-"""What a study costs before it starts: jobs, hours of one core, disk.
+"""The cost of a study before it starts: jobs, core hours, disk.
 
-Times of one job come from the study's finished jobs (results/STUDY/benchmarks, wall time), else from `config/costs.yaml`, which
-states where and when they were measured. A job whose files are there counts as done.
+The time of a job comes from the study's finished jobs (results/STUDY/benchmarks, wall time), else from `config/costs.yaml`, which
+states where and when it was measured. A job whose files exist counts as done.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,33 +20,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Cost:
-    """Jobs of one stage: how many, how many of them are left, seconds of each, and MB that all of them leave on disk."""
+    """Jobs of one stage: their number, the number left, seconds of each, and MB on disk of all of them."""
 
     stage: str
     jobs: int
     left: int
     each_s: float
-    """In the mean over the jobs that are left."""
+    """Mean over the jobs left."""
     disk_mb: float = 0.0
 
     @property
     def hours(self) -> float:
-        """Of one core, for what is left."""
+        """Core hours of the jobs left."""
         return self.left * self.each_s / 3600
 
 
 def read_costs(path: str | Path | None = None) -> dict[str, Any]:
-    """The measured times of `config/costs.yaml`, of the folder that the command runs in or as they ship."""
+    """The measured times of `config/costs.yaml` in the working folder, or those that ship with the package."""
     return read_yaml(here_or_shipped(path or "config/costs.yaml"), missing="there is no file of measured times; correct the path.")
 
 
 def origin_of(opened: "OpenStudy", measured: Mapping[str, Any]) -> str:
-    """Where and when the times of a kind of study were measured."""
+    """Place and date of the measured times of a kind of study."""
     return measured.get(opened.kind, measured)["origin"]
 
 
 def costs_of_jobs(opened: "OpenStudy", measured: Mapping[str, Any], folder: str | Path) -> list[Cost]:
-    """[Cost] of a study that lists its jobs, in their order.
+    """[Cost] of a study with a list of jobs, in their order.
 
     measured: config/costs.yaml, with `seconds` and `mb` below the kind
     """
@@ -64,7 +64,7 @@ def _stage_cost(stage, jobs, times, folder):
 
 
 def _job_s(job, times):
-    """Seconds of a job by its work: `start` for each, and so many for each unit."""
+    """Seconds of a job: `start` plus a time for each unit of work."""
     return times["seconds"]["start"] + sum(count * times["seconds"][unit] for unit, count in job.work.items())
 
 
@@ -86,7 +86,7 @@ def _words(hours):
 
 
 def left_of(files: Sequence[Path]) -> int:
-    """How many of the files are not there."""
+    """Number of files that do not exist."""
     return sum(not file.exists() for file in files)
 
 
@@ -97,6 +97,6 @@ def finished_s(folder: Path, pattern: str) -> float | None:
 
 
 def wall_s(path: Path) -> float | None:
-    """Seconds of wall time in Snakemake's benchmark of a job; None of one that was killed while it wrote them."""
+    """Wall time in s of a job from Snakemake's benchmark; None if the job was killed while it wrote the file."""
     names, *rows = [line.split("\t") for line in path.read_text(encoding="utf-8").splitlines()] or [[]]
     return float(rows[0][0]) if rows and len(rows[0]) == len(names) else None

@@ -1,4 +1,4 @@
-"""A study as a list of jobs, each a stage on files: what a workflow's rules are made of, and what runs here without a workflow.
+"""A study as a list of jobs, each a stage on files. The workflow makes its rules from them; `run_jobs` runs them without it.
 
 A stage is `softtact.studies.KIND.stages.NAME` with a function `run(*, inputs, outputs, settings, threads)`, or a function NAME of
 a module in that package (or of the module `stages` itself).
@@ -32,17 +32,17 @@ class Job:
     """A stage on files."""
 
     stage: str
-    """Its name, which the rule, the log and the benchmark have, too."""
+    """Its name, also of the rule, the log and the benchmark."""
     inputs: Paths
     """{name: path or paths} of the files that it reads."""
     outputs: Paths
-    """{name: path or paths} of the files that it writes; `{wildcard}` distinguishes it from other jobs of the stage."""
+    """{name: path or paths} of the files that it writes; a `{wildcard}` distinguishes the jobs of a stage."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """JSON values: just those that the stage uses, for only their change reruns it."""
+    """JSON values: only those that the stage uses, because a change of them reruns it."""
     wildcards: Mapping[str, str] = field(default_factory=dict)
-    """{wildcard: value} of the outputs' names."""
+    """{wildcard: value} in the outputs' names."""
     work: Mapping[str, float] = field(default_factory=dict)
-    """{unit: how many}: sizes from which config/costs.yaml gives its time."""
+    """{unit: number}: amounts of work, from which config/costs.yaml gives its time."""
     threads: int = 1
     """Cores that it uses in a workflow."""
 
@@ -60,23 +60,23 @@ class Job:
 
 
 def paths_of(named: Mapping[str, Any]) -> list[str]:
-    """The paths of named inputs or outputs, one after the other."""
+    """The paths of named inputs or outputs as one list."""
     return [path for paths in named.values() for path in ([paths] if isinstance(paths, str) else paths)]
 
 
 def figure_files(folder: str, name: str) -> dict[str, str]:
-    """The outputs of a job that draws a figure of a study whose results lie in a folder."""
+    """The outputs of a job that draws a figure into a study's results folder."""
     return {kind: f"{folder}/figures/{name}.{kind}" for kind in ("png", "svg")}
 
 
 def from_here(path: str | Path) -> str:
-    """A path relative to the working folder where it lies below it: the place of that folder is no reason to run a job again."""
+    """A path below the working folder relative to it, so that a job does not rerun when that folder is moved; else unchanged."""
     path = Path(path)
     return os.path.relpath(path) if path.resolve().is_relative_to(Path.cwd().resolve()) else str(path)
 
 
 def files_made(jobs: Sequence[Job], start: str, end: str = "") -> list[str]:
-    """Of all outputs of some jobs the paths that start and end so, in their order."""
+    """The paths among the outputs of some jobs that start with `start` and end with `end`, in their order."""
     return [path for job in jobs for path in paths_of(job.made()) if path.startswith(start) and path.endswith(end)]
 
 
@@ -108,16 +108,16 @@ def _functions(path: Path) -> list[str]:
 
 
 def find_stage(stage: str) -> Callable[..., None]:
-    """The function of a stage KIND.NAME."""
+    """Import and return the function of a stage KIND.NAME."""
     module, _, function = stage_source(stage).partition(":")
     return getattr(importlib.import_module(module), function or "run")
 
 
 def run_jobs(kind: str, jobs: Sequence[Job], folder: str | Path, *, threads: int = 1, label: str = "") -> None:
-    """Run in this process what is left of a study's jobs, in their order.
+    """Run the unfinished jobs of a study in this process, in their order.
 
-    A job is left unless its outputs are there and were made of the same inputs, settings and code, of which `.made.json` in the
-    folder keeps a digest. One that fails ends the run; what was made before it is kept.
+    A job is finished if its outputs exist and were made from the same inputs, settings and code, of which `.made.json` in the
+    folder holds a hash. A job that fails ends the run; earlier outputs are kept.
     """
     folder = Path(folder)
     with held(folder):
@@ -137,13 +137,13 @@ def run_jobs(kind: str, jobs: Sequence[Job], folder: str | Path, *, threads: int
 
 
 class _Record:
-    """What the outputs of a folder's jobs were made of: {first output: digest}, in a file."""
+    """The file with {first output: hash of inputs, settings and code} of the finished jobs of a folder."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / RECORD
         try:
             self._digests = read_json(self._path)
-        except InputError:     # none yet, or damaged: all jobs run
+        except InputError:     # missing or damaged: all jobs run
             self._digests = {}
 
     def has(self, job: Job, digest: str) -> bool:
@@ -160,7 +160,7 @@ class _Record:
 
 
 def _job_digest(kind, job):
-    """Of all that a job's outputs follow from: its settings, the contents of its inputs, the code of its stage."""
+    """Hash of everything that determines a job's outputs: its settings, the contents of its inputs, the code of its stage."""
     found = sha256(code_digest(stage_source(f"{kind}.{job.stage}"), source=SOURCE).encode())
     found.update(json.dumps([job.stage, job.settings], sort_keys=True).encode())
     for name, paths in job.inputs.items():
@@ -174,19 +174,19 @@ def _job_digest(kind, job):
 
 @contextlib.contextmanager
 def held(folder: str | Path) -> Iterator[None]:
-    """Keep a second run of a study out of its folder while the block runs.
+    """Lock a study's folder against a second run while the block runs.
 
-    The system drops this lock when its holder dies, however it dies; Snakemake's would stay behind.
+    The system releases this lock whenever its holder dies; Snakemake's lock would remain.
     """
     file = Path(folder, ".running")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        lock = file.open("a")     # which leaves the time of the file
+        lock = file.open("a")     # does not change the file's modification time
     except OSError as error:
         raise InputError(f"{folder}: cannot be written to ({error.strerror}); correct that.") from None
     with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise InputError(f"{folder}: another run of this study is at work; wait for its end.") from None
+            raise InputError(f"{folder}: another run of this study is in progress; wait for its end.") from None
         yield

@@ -1,4 +1,4 @@
-"""The kinds of studies: how the configuration of each is read, what its jobs are, what they cost.
+"""The kinds of studies, with the functions that read their configurations, list their jobs and estimate their costs.
 
 A new kind is a folder of `softtact.studies`, a line here, and a file `workflow/rules/KIND.smk`.
 """
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of study; functions are named `module:function` and imported when they are called."""
+    """A kind of study; functions are given as `module:function` and imported when called."""
 
     read: str
-    """(path) -> mapping: a configuration file over the defaults of its kind."""
+    """(path) -> mapping: a configuration file merged into the defaults of its kind."""
     load: str
-    """(mapping, path) -> study: checked, with `.name`; files that it names may be relative to the path's folder."""
+    """(mapping, path) -> checked study with `.name`; paths in it may be relative to the folder of `path`."""
     jobs: str
-    """(study, results folder) -> [Job]; empty where workflow/rules/KIND.smk itself lists inputs and outputs."""
+    """(study, results folder) -> [Job]; empty if workflow/rules/KIND.smk itself lists inputs and outputs."""
     costs: str = "softtact.studies.cost:costs_of_jobs"
     """(kind, study, measured, results folder) -> [Cost]."""
 
@@ -64,27 +64,27 @@ class OpenStudy:
         return KINDS[self.kind].call("jobs", self.study, folder)
 
     def costs(self, measured: Mapping[str, Any], folder: str | Path) -> "list[Cost]":
-        """What its stages cost, and what of it is left where results lie in a folder."""
+        """The costs of its stages, and of the jobs not yet finished in a results folder."""
         return KINDS[self.kind].call("costs", self, measured, folder)
 
 
 def kind_of(values: Mapping[str, Any], *, where: str = "the configuration") -> str:
-    """The kind of a configuration; one that states none is of the hybrid study."""
+    """The kind of a configuration; hybrid by default."""
     kind = values.get("kind", "hybrid")
     refuse_unknown(str(kind), list(KINDS), kind="kind of study", where=where)
     return kind
 
 
 def checked_study(values: Mapping[str, Any], path: str | Path | None = None) -> OpenStudy:
-    """The study of a mapping that was read from the file `path`; the first fault becomes an `InputError` of one sentence."""
+    """The study of a mapping from the file `path`; raises an InputError of one sentence for the first fault."""
     kind = kind_of(values, where=str(path or "the configuration"))
     return OpenStudy(kind, KINDS[kind].call("load", values, None if path is None else here_or_shipped(path)))
 
 
 def open_study(path: str | Path, *, kind: str | None = None) -> OpenStudy:
-    """The study of a configuration file, which ships with the package where the working folder has none of its name.
+    """The study of a configuration file in the working folder or, if it is not there, in the package.
 
-    kind: of a file that need not state it, because a command of that kind reads it
+    kind: of the study, if the file need not state it because a command of that kind reads it
     """
     kind = kind or kind_of(read_mapping(path), where=str(path))
     return OpenStudy(kind, KINDS[kind].call("load", KINDS[kind].call("read", path), here_or_shipped(path)))

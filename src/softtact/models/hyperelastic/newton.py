@@ -184,7 +184,7 @@ class _Press:
     def accepted(self, state, trial):
         self.iterations += 1
         target = f"on the way to {self.force:.4g} N" if self.force is not None else f"{trial.indentation:.3f} mm down"
-        self.body.watch.beat(f"{target}, now {trial.force:.4g} N, iteration {self.iterations}, largest unbalanced force "
+        self.body.watch.report(f"{target}, now {trial.force:.4g} N, iteration {self.iterations}, largest unbalanced force "
                              f"{self.residual(trial):.2g} N")
         if np.abs(trial.slab.displacement - state.slab.displacement).max() < _STILL_MM:
             self.projecting = False

@@ -173,7 +173,7 @@ class _Balance:
         self.just_predicted = self.pending
         self.pending, self.taken = False, self.taken + 1
         self.before = [*self.before, self.residual(state)][-_REMEMBERED:]
-        self.body.watch.beat(f"{self.target.name}, iteration {self.taken}, largest unbalanced force {self.residual(trial):.2g} N")
+        self.body.watch.report(f"{self.target.name}, iteration {self.taken}, largest unbalanced force {self.residual(trial):.2g} N")
 
     def recovered(self, state: SolidState) -> bool:
         return False

@@ -1,4 +1,4 @@
-"""The study of grasps: its configuration, and what it grasps."""
+"""The configuration of the study of grasps, and its objects."""
 
 import zlib
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ _Models = Annotated[list[Literal["elastic", "foundation", "hyperelastic"]], Fiel
 
 
 class Places(Section):
-    """How far a drawn position lies from the middle of the grip, to either side."""
+    """Largest distance of a drawn position from the middle of the grip, to either side."""
 
     x_mm: NotNegative
     y_mm: NotNegative
@@ -30,7 +30,7 @@ class Places(Section):
 
 
 class OneEvent(Section):
-    """Objects that several models press at one and the same event, on a cover of a law's printed constants."""
+    """Objects that several models press at the same event, on a cover with the printed constants of a law."""
 
     objects: list[str]
     models: _Models

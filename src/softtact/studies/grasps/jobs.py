@@ -1,7 +1,7 @@
 """The jobs of a study of grasps.
 
     grasps/ITEM/events.nc, readings.nc     one position of an object; readings are of the event `grip`
-    one_event/OBJECT.nc                    what several models make of one event
+    one_event/OBJECT.nc                    maps of several models for one event
     grasps.csv                             a row for each grasp
     tables/claims.csv, figures/, report.html
 """
@@ -20,11 +20,11 @@ from softtact.studies.grasps.stages.summary import papers_model
 from softtact.studies.jobs import Job, from_here
 
 _OF_READINGS = {"force_n", "trials", "seed", "virtual_sensor"}
-_SIDES = (np.diag([1.0, 1.0, 1.0, 1.0]), np.diag([-1.0, 1.0, -1.0, 1.0]))     # the mesh as the left and the right sensor see it
+_SIDES = (np.diag([1.0, 1.0, 1.0, 1.0]), np.diag([-1.0, 1.0, -1.0, 1.0]))     # mesh to the frames of the left and the right sensor
 
 
 def jobs(study: GraspStudy, folder: str | Path) -> list[Job]:
-    """All jobs of a study whose results lie in a folder, in an order in which they can run."""
+    """All jobs of a study with results in a folder, in an order in which they can run."""
     values = study.values
     grasps, readings = f"{folder}/grasps/{{item}}/events.nc", f"{folder}/grasps/{{item}}/readings.nc"
     sensor = {"sensor": from_here(sensor_file(values.sensor))}
@@ -46,7 +46,7 @@ def jobs(study: GraspStudy, folder: str | Path) -> list[Job]:
 
 
 def _summary(study, folder, sensor, pressing, made):
-    """The jobs that gather what the others made."""
+    """The jobs that summarise the results of the others."""
     values = study.values
     items = [{"grasp": item.id} | _placed(item) for item in study.items]
     files = {name: [str(one[name]) for one in made if name in one] for name in ("events", "readings")}
@@ -71,12 +71,12 @@ def _summary(study, folder, sensor, pressing, made):
 
 
 def _placed(item):
-    """An object in a position, as stages take it."""
+    """An object in a position, in the form of a stage's settings."""
     return {"object": item.entry.name, "unit": item.entry.unit, "x_mm": item.x_mm, "y_mm": item.y_mm, "angle_deg": item.angle_deg}
 
 
 def _presses(study, entry):
-    """{model: presses} of a grasp, two events on two sensors, and the scene; the policy `error` may take a costlier model."""
+    """{model: presses} of a grasp, two events on two sensors, and the scene; the policy `error` may choose a slower model."""
     model, spec = study.values.model, study.spec
     models = [_ruled(entry.file, entry.unit, side, spec.footprint_mm, spec.thickness_mm) if model == "auto" else model
               for side in (0, 1)]
@@ -85,7 +85,7 @@ def _presses(study, entry):
 
 @lru_cache
 def _ruled(file, unit, side, footprint_mm, reach_mm):
-    """The model that the paper's rule takes for an object as a sensor sees it where it is centred."""
+    """The model that the paper's rule chooses for an object, centred in the frame of a sensor."""
     mesh = read_mesh(file, unit=unit)
     mesh.apply_transform(_SIDES[side])
     return papers_model(place(mesh), footprint_mm=footprint_mm, reach_mm=reach_mm)

@@ -1,8 +1,8 @@
 """A study's configuration, checked before any work starts.
 
-`load_study` is the entry. It also reads the files that the configuration names (sensor, materials, objects), so
-that rules hand their stages plain values, and a comment in a YAML file reruns nothing. A sensor or a material is found by its name
-(`softtact.sensors.library`); a file below config/ that the working folder does not have is the one that ships with the package.
+`load_study` also reads the files that the configuration names (sensor, materials, objects), so that rules pass plain values to
+their stages, and a changed comment in a YAML file reruns nothing. A sensor or a material is found by its name
+(`softtact.sensors.library`); for a file below config/ that the working folder lacks, the one in the package is used.
 """
 
 from collections.abc import Mapping
@@ -28,9 +28,9 @@ from softtact.studies.hybrid.keys import CENTRED, Data, Recording, Values
 from softtact.studies.hybrid.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
 
 SETS = ("indenters", "unseen", "grasps")
-TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
+TOGETHER = 50     # most presses of a fast model in one job: one minute of work, and a command line within the system's limit
 _AT = "the configuration, at 'data.recordings'"
-_LISTED = 8     # items without a recording that a refusal names
+_LISTED = 8     # most items without a recording that a message lists
 
 
 @dataclass(frozen=True)
@@ -46,40 +46,40 @@ class Study:
     items_of: dict
     """{set: {id: Item}} in the order of the configuration."""
     section_item: Item
-    """What figure 2 presses."""
+    """The item of figure 2."""
     archive: Archive | None = None
-    """The published files that maps and readings come from, or None where items are pressed."""
+    """The published files with maps and readings, or None if items are pressed."""
     recordings: dict[str, list[Recording]] | None = None
-    """{SET/ITEM: recordings that its readings come from}, or None."""
+    """{SET/ITEM: recordings with its readings}, or None."""
 
     @property
     def virtual(self) -> bool:
-        """Whether the readings are the virtual sensor's, which reads the reference's presses."""
+        """Whether the readings are those of the virtual sensor, made from the reference model's presses."""
         return self.archive is None and self.recordings is None
 
     @property
     def tested(self) -> list[str]:
-        """The models that a network is trained for: of an archive, those whose simulations are there."""
+        """The models that a network is trained for; of an archive, those with simulations."""
         return list(self.archive.simulated) if self.archive else self.values.tested
 
     @property
     def learnt_from(self) -> list[str]:
-        """The models whose maps data sets are made of: those under test, and the reference where the virtual sensor reads it."""
+        """The models with data sets: those under test, and the reference if the virtual sensor reads it."""
         return list(dict.fromkeys([*self.tested, self.values.reference])) if self.virtual else self.tested
 
     @property
     def pressed_with(self) -> list[str]:
-        """The models that every item is pressed with: those learnt from, and those that policies choose between."""
+        """The models that press every item: those with data sets, and those that policies choose between."""
         return [] if self.archive else list(dict.fromkeys([*self.learnt_from, *self.values.choice.models.values()]))
 
     @property
     def source(self) -> str:
-        """What the readings are from, in words."""
+        """The source of the readings, in words."""
         return "virtual sensor" if self.virtual else PUBLISHED if self.archive else RECORDED
 
     @property
     def counts_per_relative_change(self) -> float | None:
-        """Gain of the virtual sensor's readings; None where they are a real sensor's, whose gain is not known."""
+        """Gain of the virtual sensor's readings; None for a real sensor, whose gain is unknown."""
         return VirtualSensorSettings.from_dict(self.values.virtual_sensor).counts_per_relative_change if self.virtual else None
 
     @property
@@ -89,23 +89,23 @@ class Study:
 
     @property
     def sensor(self) -> dict[str, Any]:
-        """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
+        """The sensor's description as plain JSON values, without the reasons of assumed values."""
         return self.spec.model_dump(mode="json")
 
     def trials_of(self, set_name: str) -> float:
-        """How often each press of a set is read; of recordings, the mean over its items."""
+        """Number of readings of each press of a set; for recordings the mean over its items."""
         if self.recordings is None:
             return getattr(self.values.objects, set_name).trials or self.values.trials
         return mean(map(self.readings_of, self.items_of[set_name].values())) if self.items_of[set_name] else 0
 
     def readings_of(self, item: Item) -> int:
-        """How often an item's press is read."""
+        """Number of readings of an item's press."""
         if self.recordings is not None:
             return len(self.recordings[f"{item.set}/{item.id}"])
         return getattr(self.values.objects, item.set).trials or self.values.trials
 
     def named(self) -> dict[str, Any]:
-        """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
+        """The contents of the named files as plain JSON values: the sensor, the materials' settings, the items of each set."""
         materials = {name: {"curves": material.curve_settings, "fit": material.fit_settings}
                      for name, material in self.materials.items()}
         items = {name: [asdict(item) for item in items.values()] for name, items in self.items_of.items()}
@@ -116,10 +116,10 @@ class Study:
         return [item for items in self.items_of.values() for item in items.values()]
 
     def press_jobs(self, model: str) -> list[list[Item]]:
-        """[[Item]]: what a model presses in one job each, in the order of `items`.
+        """[[Item]]: the items that a model presses in each job, in the order of `items`.
 
-        A fast model presses an object's places together, for to start takes it longer than to press. Another object is another
-        job, so that a change of one presses that one again.
+        A fast model presses all places of an object in one job, because its start takes longer than a press. Each object has its
+        jobs, so that a changed object reruns only these.
         """
         if self.values.models[model].kind == "hyperelastic":
             return [[item] for item in self.items()]
@@ -128,7 +128,7 @@ class Study:
 
 
 def read_values(configfile: str | Path | None = None, *, default: str | Path = "config/config.yaml") -> dict[str, Any]:
-    """The configuration mapping of a file over the default one, merged as Snakemake does it."""
+    """The configuration mapping of a file merged into the default one, as Snakemake does."""
     values = read_mapping(default)
     return values if configfile is None else _merged(values, read_mapping(configfile))
 
@@ -139,9 +139,9 @@ def _merged(base, over):
 
 
 def load_study(values: Mapping[str, Any], path: Path | None = None) -> Study:
-    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence.
+    """The `Study` of a configuration mapping; raises an InputError of one sentence for the first fault.
 
-    path: the file that it was read from; the files that a hybrid study names are relative to the working folder, not to this one
+    path: the file that it was read from; paths in a hybrid study are relative to the working folder, not to this file
     """
     checked = validated(Values, values, where="the configuration")
     spec = SensorSpec.from_yaml(_named("sensor", sensor_file, checked.sensor))
@@ -161,7 +161,7 @@ def load_study(values: Mapping[str, Any], path: Path | None = None) -> Study:
 
 
 def _named(key, find, name):
-    """The file of a name in the configuration, as `find` of the library gives it; a refusal names the key."""
+    """The file of a name in the configuration, from the library's function `find`; an error message names the key."""
     try:
         return find(name)
     except InputError as error:
@@ -169,7 +169,7 @@ def _named(key, find, name):
 
 
 def _report_outside_paths(study):
-    """Report on stderr which files of the configuration lie outside the folder that the study runs in."""
+    """Report on stderr the files of the configuration that lie outside the working folder."""
     values = study.values
     named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
              *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
@@ -184,7 +184,7 @@ def _report_outside_paths(study):
 
 
 def _section_item(values, catalogue):
-    """The item that the section's press presses, centred."""
+    """The item of the section's press, centred."""
     name = values.section.object
     refuse_unknown(name, list(catalogue), kind="object", where="the configuration, at 'section.object'")
     return make_item(catalogue[name], CENTRED, None, first=True)
@@ -198,10 +198,10 @@ def _archive(values):
 
 
 def _recordings(data: Data, items_of: Mapping[str, Mapping[str, Any]], spec: SensorSpec) -> dict[str, list[Recording]] | None:
-    """{SET/ITEM: recordings, its trials}, or None where the readings have another source.
+    """{SET/ITEM: recordings, its trials}, or None if the readings have another source.
 
-    Raises InputError for a sensor of another grid, an item that the study does not have, a missing file or one listed twice, and
-    where an item has no recording.
+    Raises InputError for a sensor with another grid, an unknown item, a file that is missing or listed twice, and an item without
+    a recording.
     """
     if data.source != "recorded":
         return None
@@ -217,13 +217,13 @@ def _recordings(data: Data, items_of: Mapping[str, Mapping[str, Any]], spec: Sen
     missing = [item for item in items if item not in found]
     if missing:
         more = f" and {len(missing) - _LISTED} more" if len(missing) > _LISTED else ""
-        raise InputError(f"{_AT}: there is no recording of {', '.join(missing[:_LISTED])}{more}; add one of each, or take the "
-                         "items out of 'objects'.")
+        raise InputError(f"{_AT}: there is no recording of {', '.join(missing[:_LISTED])}{more}; add one of each, or remove the "
+                         "items from 'objects'.")
     return {item: found[item] for item in items}
 
 
 def _check_files(recordings):
-    """Refuse a file that is not there, and a finger of a recording that is listed for two presses."""
+    """Refuse a missing file, and a finger of a recording that is listed for two presses."""
     seen: dict[tuple[Path, int], str] = {}
     for recording in recordings:
         for path in (recording.file, recording.force_log):
@@ -231,8 +231,8 @@ def _check_files(recordings):
                 raise InputError(f"{_AT}: there is no file {path}, of {recording.item}; correct the path.")
         press = Path(recording.file).resolve(), recording.finger
         if press in seen:
-            raise InputError(f"{_AT}: finger {recording.finger} of {recording.file} stands for {seen[press]} and again for "
-                             f"{recording.item}; a recording is one press: leave it at one of them.")
+            raise InputError(f"{_AT}: finger {recording.finger} of {recording.file} is listed for {seen[press]} and for "
+                             f"{recording.item}, but a recording is of one press; remove one of the two.")
         seen[press] = recording.item
 
 
@@ -245,7 +245,7 @@ def _check_forces(values, spec):
 
 
 def _materials(values, spec):
-    """{name: MaterialConfig} of the listed materials, among which the sensor's must be."""
+    """{name: MaterialConfig} of the listed materials, which must include the sensor's."""
     for layer in (spec.dielectric, spec.cover):
         if layer.material not in values.materials:
             raise InputError(f"the configuration, at 'materials': sensor {spec.name} is made of {layer.material!r}, "
@@ -259,7 +259,7 @@ def _check_models(values, spec):
     for name, model in values.models.items():
         where = f"the configuration, at 'models.{name}'"
         if model.friction and model.kind != "hyperelastic":
-            raise InputError(f"{where}: a model of kind {model.kind!r} knows no friction; leave 'friction' out.")
+            raise InputError(f"{where}: a model of kind {model.kind!r} has no friction; leave 'friction' out.")
         if model.device != "cpu" and model.kind != "hyperelastic":
             raise InputError(f"{where}: a model of kind {model.kind!r} has no 'device'; leave it out.")
         if model.friction:
@@ -267,7 +267,7 @@ def _check_models(values, spec):
 
 
 def _check_sensor(values, spec):
-    """Refuse now a sensor that a model or a network of the study would refuse after hours, or one that is calibrated."""
+    """Refuse early a sensor that a model or network of the study would refuse after hours, and a calibrated one."""
     if spec.calibration is not None:
         raise InputError(f"the configuration, at 'sensor': {spec.name} is calibrated, and a study draws its specimens and "
                          "their gain by 'virtual_sensor'; name the sensor that it was calibrated from.")
@@ -281,7 +281,7 @@ def _check_sensor(values, spec):
 
 
 def _with_range(values, spec):
-    """The configuration with the sensor's range of counts as that of the SSIM, unless it states another."""
+    """The configuration with the sensor's range of counts for the SSIM, unless it states another."""
     if "data_range" in values.ssim.model_fields_set:
         return values
     return values.model_copy(update={"ssim": values.ssim.model_copy(update={"data_range": spec.largest_counts})})

@@ -1,7 +1,7 @@
-"""What a study of networks costs before it starts.
+"""The cost of a hybrid study before it starts.
 
-Epochs count in full, though patience may end a training sooner, and all networks of a search cost as the printed one: so `at most`.
-Presses count each for itself, also where a fast model presses an object's places in one job.
+It is an upper bound: all epochs count, although patience may end a training sooner, and each network of a search counts as the
+printed one. Presses count individually, also if a fast model makes several in one job.
 """
 
 import itertools
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from softtact.learning.settings import Search
     from softtact.studies.registry import OpenStudy
 
-BYTES = 4          # of a number in a data set; twice that in a press
-READING_NUMBERS = 2          # branches of a reading: loading and unloading
+BYTES = 4          # per number in a data set; twice that in a press
+READING_NUMBERS = 2          # numbers per taxel of a reading: loading and unloading
 
 
 def costs_of_study(opened: "OpenStudy", measured: Mapping[str, Any], folder: str | Path) -> list[Cost]:
-    """[Cost] of a `Study`, in the order of its work. A study on the published archive presses nothing and is refused."""
+    """[Cost] of a `Study`, in the order of its stages. Raises InputError for a study on the published archive."""
     study, folder = opened.study, Path(folder)
     if study.archive:
-        raise InputError(f"the study {study.name}: it reads the published archive, whose size is known after the import only; "
-                         "costs are told of studies that press.")
+        raise InputError(f"the study {study.name}: it reads the published archive, whose size is known only after the import; "
+                         "costs can be estimated only for studies that press.")
     costs = [*_presses(study, measured, folder), _readings(study, measured, folder), *_learning(study, measured, folder)]
     return [*costs, Cost("all else", 1, int(not (folder / "report.html").exists()), measured["all_else_s"])]
 
@@ -51,13 +51,13 @@ def _readings(study, measured, folder):
     stage = "read_virtual_sensor" if study.virtual else "read_recordings"
     numbers = sum(map(study.readings_of, study.items())) * len(study.values.forces_n) * READING_NUMBERS
     taxels = study.spec.taxels.rows * study.spec.taxels.columns
-    seconds = finished_s(folder, f"{stage}/*/*.tsv") or measured["reading_s"]     # of both: most of it is the start of a program
+    seconds = finished_s(folder, f"{stage}/*/*.tsv") or measured["reading_s"]     # mostly the start of a program
     return Cost(stage, len(files), left_of(files), seconds, numbers * taxels * 2 * BYTES / 1e6)
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Samples of each split: a map with its reading."""
+    """Number of samples (a map with its reading) in each split."""
 
     train: int
     validation: int
@@ -65,7 +65,7 @@ class Sizes:
 
     @classmethod
     def of(cls, study: Study) -> "Sizes":
-        """As many as the study has where all presses are within their models' validity."""
+        """The numbers if all presses are within their models' validity."""
         load_steps, dataset = len(study.values.forces_n), study.values.dataset
         maps = {name: len(items) * load_steps for name, items in study.items_of.items()}
         trained = round(dataset.train_fraction * maps["indenters"])
@@ -112,7 +112,7 @@ def _learning(study, measured, folder):
 
 
 def _form(architecture):
-    """Whose times an architecture has: the searched one is of the printed form."""
+    """The architecture in the table of measured times; a searched network counts as printed."""
     return "printed" if architecture == "searched" else architecture
 
 
@@ -122,7 +122,7 @@ def _epoch_s(time, train, sizes):
 
 
 def epochs_of_a_trial(search: "Search") -> float:
-    """Epochs that Hyperband gives a trial in the mean: Optuna's brackets, in each of which one in `reduction_factor` goes on."""
+    """Mean epochs of a trial under Hyperband: in each of Optuna's brackets one trial in `reduction_factor` continues."""
     factor = search.reduction_factor
     rungs = [factor**k for k in range(search.max_epochs.bit_length()) if factor**k <= search.max_epochs]     # 1, 3, 9, ...
     shares, means = [], []
@@ -149,7 +149,7 @@ def _rates_s(time, values, sizes):
 
 
 def _curve_s(times, values, sizes):
-    """Seconds of one model's learning curve: equal steps for each share, and all test maps read after each."""
+    """Seconds of one model's learning curve: equal steps for each share, and a prediction of all test maps after each."""
     total, batch = 0.0, values.training.batch
     for kind in values.learning_curve.networks:
         time = times[_form(kind)]
@@ -161,7 +161,7 @@ def _curve_s(times, values, sizes):
 
 
 def _finished_press_s(folder, model, jobs):
-    """Mean wall time of a model's finished presses, or None; several presses may share a job; jobs: [[Item]]."""
+    """Mean wall time of a model's finished presses, or None. jobs: [[Item]], since several presses may share a job."""
     seconds, presses = 0.0, 0
     for items in jobs:
         stage = "simulate_press" if len(items) == 1 else "simulate_presses"

@@ -1,4 +1,4 @@
-"""The keys of a study's configuration, each typed and described in place; `Values` is all of it."""
+"""The keys of a study's configuration, each with its type and description; `Values` is the whole configuration."""
 
 import itertools
 from pathlib import Path
@@ -13,11 +13,11 @@ from softtact.readout.virtual_sensor import VirtualSensorSettings
 from softtact.sensors.specification import ORIENTATIONS
 from softtact.unknown_names import Section, unknown
 
-CENTRED = "centred"  # the pose that gives an item its object's plain name
+CENTRED = "centred"  # the pose for which an item has its object's name without a suffix
 
 
 def _one_of(known, *, kind):
-    """A string among the `known` ones."""
+    """The type of a string that is one of the `known`."""
 
     def check(name):
         if name not in known:
@@ -60,11 +60,11 @@ class GlassMesh(Section):
     frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of its layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around its core, thin at its rim")
-    refinement: Annotated[int, Field(ge=0)] | None = Field(None, description="how often all elements are split in plan")
+    refinement: Annotated[int, Field(ge=0)] | None = Field(None, description="how often all elements are split in the plane")
 
 
 class Ftir(Section):
-    """The dielectric pressed on glass, as a model and as a virtual specimen, and the camera that looks at it."""
+    """The dielectric pressed on glass, as a model and as a virtual specimen, and the camera behind the glass."""
 
     forces_n: ForcesFromZero = Field(description="on the whole dielectric")
     orientations: Annotated[list[FrustumOrientation], Field(min_length=1)] = Field(
@@ -79,7 +79,7 @@ class Ftir(Section):
     tip_scatter: NotNegative = Field(0.02, description="the same of their tips' diameters")
     mesh: GlassMesh = Field(GlassMesh(), description="of cells whose narrow end stands on the glass")
     camera: Camera
-    measured: str | None = Field(None, description="CSV with force_n, area_mm2 (mean frustum) of one's own test")
+    measured: str | None = Field(None, description="CSV with force_n, area_mm2 (mean frustum) of a measurement")
 
     @model_validator(mode="after")
     def _tests_what_it_solves(self):
@@ -106,14 +106,14 @@ class Thresholds(Section):
 
 
 class Complexity(Section):
-    """When an object asks for the hyperelastic model."""
+    """The rule that chooses the hyperelastic model for an object."""
 
     rule: Literal["any", "all"]
     thresholds: Thresholds
 
 
 class Choice(Section):
-    """How the policies that choose a model are compared."""
+    """The comparison of the policies that choose a model."""
 
     models: dict[Literal["elastic", "foundation", "hyperelastic"], Name] = Field(description="the study's model of each kind")
     tolerances_mm: Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)] = Field(
@@ -121,14 +121,14 @@ class Choice(Section):
 
 
 class SectionPress(Section):
-    """The press that figure 2 and the report's turning view show: a large force, with the deformed body kept."""
+    """The press of figure 2 and of the report's interactive view: a large force, with the deformed body kept."""
 
     object: Name = Field(description="of the catalogue")
     force_n: PositiveFloat
 
 
 class ItemSet(Section):
-    """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed: listed ones, then drawn ones."""
+    """Objects of the catalogue, by name or `all` of a set, and the poses of each press: listed ones, then drawn ones."""
 
     names: list[Name] | Literal["all"]
     poses: dict[Name, Six | None] = Field({CENTRED: None}, min_length=1, description="of each: x, y, z in mm, then degrees")
@@ -137,7 +137,7 @@ class ItemSet(Section):
 
 
 class Objects(Section):
-    """What is pressed: training indenters, indenters that training never sees, grasped objects."""
+    """The pressed objects: training indenters, indenters outside the training, grasped objects."""
 
     catalogue: str
     indenters: ItemSet
@@ -156,34 +156,35 @@ class CatalogueEntry(Section):
 
 
 class Mesh(Section):
-    """Resolution of a model's mesh, and the scatter of its frusta; what is not stated is the model's default."""
+    """Resolution of a model's mesh, and the scatter of its frusta; other values are the model's defaults."""
 
     preset: Literal["default", "draft", "stable", "fine"] | None = Field(
-        None, description="mesh and tolerances, which the other keys change (docs/explanation/discretisation.md)")
+        None, description="mesh and tolerances; the other keys override them (docs/explanation/discretisation.md)")
     sheet_layers: PositiveInt | None = None
     cover_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
     cover_splits: list[Annotated[int, Field(ge=0, le=5)]] | None = Field(
-        None, description="how often the elements, a pitch wide, of the uppermost of these layers are split under the object and "
-                          "at its edges; layers below, without a number here, keep to the sheet's plan")
+        None, description="for each of the uppermost layers, how often its elements, one pitch wide, are split under the object "
+                          "and at its edges; lower layers, without a number here, keep the sheet's 2-D mesh")
     far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
     frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
     frustum_core: Annotated[float, Field(ge=0.3, le=0.8)] | None = Field(
-        None, description="corners of this core over the frustum's radius; with 0.5 frusta may be pressed flatter than with 0.6")
+        None, description="radius of this core's corners over the frustum's; with 0.5 frusta compress further than with 0.6")
     unprojected_penalty_ratio: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
     quartic_penalty_ratio: NotNegative | None = Field(
         None, description="stiffness of frusta against large volume changes that their elements' pressure misses, over mu")
     slab_quartic_penalty_ratio: NotNegative | None = Field(None, description="the same of sheet and cover")
     trilinear_pressure: bool | None = Field(None, description="pressure in the frusta's elements: trilinear (default), or linear")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
-        None, description="how often all elements are split into four in plan")
+        None, description="how often all elements are split into four in the plane")
     contact_stiffness: PositiveFloat | None = Field(None, description="N/mm3 of the contacts' penalty")
     constrained_cell_edges: bool | None = Field(
-        None, description="along all walls between cells, not only far from the object, the sheet moves as one quadratic curve: "
-                          "half the work, and 2 to 2.5 % of the map; without effect in a refined plan")
-    largest_penetration_mm: PositiveFloat | None = Field(None, description="deeper overlaps in contacts are pressed apart")
+        None, description="constrain the sheet to one quadratic curve along all cell edges, not only far from the object: "
+                          "half the work, an error of 2 to 2.5 % of the map; no effect on a refined 2-D mesh")
+    largest_penetration_mm: PositiveFloat | None = Field(
+        None, description="larger penetrations are reduced by augmented Lagrange iterations")
     height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
     tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
     thickness_scatter: Annotated[float, Field(ge=0, le=0.1)] | None = Field(
@@ -191,11 +192,11 @@ class Mesh(Section):
     specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")
 
 
-class OwnFriction(Section):
-    """A model's coefficients of Coulomb friction, in place of the sensor's."""
+class ModelFriction(Section):
+    """A model's coefficients of Coulomb friction, which replace the sensor's."""
 
     object: NotNegative = Field(0.0, description="of the object on the cover")
-    board: NotNegative = Field(0.0, description="of the frusta on the board; needs tips that are not held")
+    board: NotNegative = Field(0.0, description="of the frusta on the board; needs tips that are not bonded")
 
 
 class Model(Section):
@@ -204,21 +205,21 @@ class Model(Section):
     kind: Literal["elastic", "foundation", "hyperelastic"] = "hyperelastic"
     mesh: Mesh = Mesh()
     laws: dict[Literal["dielectric", "cover"], Law] = {}
-    friction: OwnFriction | None = Field(None, description="only of a hyperelastic model; by default the sensor's")
+    friction: ModelFriction | None = Field(None, description="only of a hyperelastic model; by default the sensor's")
     device: Literal["cpu", "cuda", "auto"] = Field(
-        "cpu", description="only of a hyperelastic model; where its elements are summed up; auto: a GPU where there is one")
+        "cpu", description="only of a hyperelastic model; where its elements are assembled; auto: a GPU if there is one")
     needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
 
     @property
     def prepared_from(self) -> list[str]:
-        """What its compliance is computed from."""
+        """The files from which its compliance is computed."""
         return ["frustum_law", "card_dielectric", "card_cover"] if self.kind == "foundation" else []
 
 
 class Recording(Section):
     """A recording of one press of an item by a TSF-85, with its force."""
 
-    item: Annotated[str, Field(pattern=r"^[a-z]+/[a-z0-9_-]+$")] = Field(description="SET/ITEM of the study, unseen/hexagon say")
+    item: Annotated[str, Field(pattern=r"^[a-z]+/[a-z0-9_-]+$")] = Field(description="SET/ITEM of the study, e.g. unseen/hexagon")
     file: str = Field(description="CSV of the maker's recorder")
     force_log: str = Field(description="CSV with time_s or Time(ms), and force_n, over the recording's time")
     finger: Literal[0, 1] = Field(0, description="that was pressed")
@@ -226,26 +227,26 @@ class Recording(Section):
 
 
 class Data(Section):
-    """Where maps and readings come from.
+    """The source of maps and readings.
 
     generated: presses, and the virtual sensor;  recorded: presses, and recordings of a real sensor;  published: both from the
     archive that the paper's authors published
     """
 
     source: Literal["generated", "recorded", "published"] = "generated"
-    recordings: list[Recording] = Field([], description="where the source is recorded; several of an item are its trials")
+    recordings: list[Recording] = Field([], description="if the source is recorded; several of an item are its trials")
     folder: str = Field("dataset", description="of the archive's CSV files (docs/how-to/published_archive.md)")
-    variant: str | None = Field(None, description="ending of the files to read, V1 say, where there are several of a kind")
-    unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
+    variant: str | None = Field(None, description="ending of the files to read, e.g. V1, if there are several of a kind")
+    unseen: list[Name] = Field([], description="the archive's indenters outside the training, e.g. donut_m for its DonutM")
     without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
-    taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
-    outliers: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
+    taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import reports which fits best")
+    outliers: Literal["leave_out", "refuse"] = Field("leave_out", description="what to do with tests that have outliers")
     largest_outlier_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
 
     @model_validator(mode="after")
     def _has_unseen_indenters(self):
         if self.source == "published" and not self.unseen:
-            raise ValueError("'unseen' is empty; name indenters of the archive that training must not see")
+            raise ValueError("'unseen' is empty; name indenters of the archive to leave out of the training")
         return self
 
     @model_validator(mode="after")
@@ -278,9 +279,9 @@ class Values(Section):
     choice: Choice
     section: SectionPress
     forces_n: Forces = Field(description="load steps of every press; each gives a map")
-    models: dict[Name, Model] = Field(description="the mechanical models, by names of one's choice")
+    models: dict[Name, Model] = Field(description="the mechanical models by freely chosen names")
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
-    reference: Name = Field(description="the model that the virtual sensor feels with")
+    reference: Name = Field(description="the model whose presses the virtual sensor reads")
     virtual_sensor: dict[VirtualSensorKey, float | list[float]] = Field(
         description="sizes of its effects, in place of their defaults (docs/explanation/virtual_sensor.md)")
     trials: PositiveInt = Field(description="readings of each press by the virtual sensor")

@@ -1,4 +1,4 @@
-"""What a study presses: the catalogue of objects, and each chosen object in its poses."""
+"""The pressed objects of a study: the catalogue, and each chosen object in its poses."""
 
 import zlib
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Item:
-    """One object in one pose: what a press presses."""
+    """One object in one pose, i.e. one press."""
 
     id: str
     """Its name in paths."""
@@ -37,7 +37,7 @@ class Item:
 
 
 def read_catalogue(path: Path) -> dict[str, CatalogueEntry]:
-    """{name: CatalogueEntry} with the mesh files' paths as seen from here; a missing mesh is refused now."""
+    """{name: CatalogueEntry} with paths of mesh files from the working folder. Raises InputError for a missing mesh."""
     lines = read_yaml(path, missing="there is no such catalogue of objects; correct 'objects.catalogue'.")
     entries = [validated(CatalogueEntry, line, where=str(path)) for line in lines or []]
     entries = [entry.model_copy(update={"file": str(path.parent / entry.file)}) for entry in entries]
@@ -45,13 +45,13 @@ def read_catalogue(path: Path) -> dict[str, CatalogueEntry]:
     if len(catalogue) < len(entries):
         names = [entry.name for entry in entries]
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"{path}: the object {twice!r} stands in it twice; give one of the two another name, or take it away.")
+        raise InputError(f"{path}: the object {twice!r} is listed twice; rename or remove one of the two.")
     return catalogue
 
 
 def items_of_set(set_name: str, chosen: ItemSet, catalogue: dict[str, CatalogueEntry], *, spec: "SensorSpec",
                  seed: int) -> dict[str, Item]:
-    """{id: Item} of one set: each object in its poses, the listed ones and those that are drawn."""
+    """{id: Item} of one set: each object in its listed and drawn poses."""
     known = [name for name, entry in catalogue.items() if entry.set == set_name]
     names = known if chosen.names == "all" else chosen.names
     where = f"the configuration, at 'objects.{set_name}'"
@@ -75,7 +75,7 @@ def make_item(entry: CatalogueEntry, pose_name: str, pose: list[float] | None, *
 
 
 def check_shapes(items_of: dict[str, dict[str, Item]]) -> None:
-    """Refuse a mesh in two sets, even under two names: a test must not hold a shape that training saw."""
+    """Refuse a mesh in two sets, even under two names: a test must not contain a shape of the training."""
     seen: dict[bytes, Item] = {}
     for item in (item for items in items_of.values() for item in items.values() if item.first):
         other = seen.setdefault(Path(item.file).read_bytes(), item)
@@ -85,7 +85,7 @@ def check_shapes(items_of: dict[str, dict[str, Item]]) -> None:
 
 
 def _dealt(chosen, objects, *, where):
-    """How many poses are drawn for each object of a set, so that there are as many presses as it states."""
+    """Number of drawn poses of each object of a set, so that the set has the stated number of presses."""
     listed = objects * len(chosen.poses)
     more = (chosen.presses or listed) - listed
     if more < 0:
@@ -95,7 +95,7 @@ def _dealt(chosen, objects, *, where):
 
 
 def _drawn(entry, count, *, spec, seed):
-    """{"1": pose, ...} of an object, `count` of them; they depend on the seed, its name and its mesh."""
+    """{"1": pose, ...} with `count` drawn poses of an object, which depend on the seed, its name and its mesh."""
     if not count:
         return {}
     from softtact.geometry.meshes import read_triangles
@@ -109,5 +109,5 @@ def _drawn(entry, count, *, spec, seed):
 
 def _check_mesh(entry):
     if not Path(entry.file).is_file():
-        raise InputError(f"{entry.file}: there is no such mesh, which the catalogue names for {entry.name!r}; "
+        raise InputError(f"{entry.file}: there is no such mesh, which the catalogue lists for {entry.name!r}; "
                          "put it there or correct the line.")

@@ -1,6 +1,6 @@
-"""report.html: one file, figures inside, links from each to its data, its code and the configuration.
+"""report.html: one file with the figures inside, and links from each to its data, its code and the configuration.
 
-The box at its head states what a study does not have that the paper has.
+The box at its head states the differences between the study and the paper.
 """
 
 from collections.abc import Iterable
@@ -62,19 +62,19 @@ _MODULE_OF = {"policies": "compare_policies", "networks": "compare_networks", "l
 _DRAWN_BY_MATPLOTLIB = "Views are rendered off screen by VTK; a figure says so where matplotlib drew them instead."
 _WITH_VIEWS = ("fig4_complexity", "fig7_maps")
 _FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")
-PAPERS_SENSOR = "coro: "     # how the line on it begins
+PAPERS_SENSOR = "coro: "     # start of the line on the paper's sensor
 PAPERS_INDENTERS, PAPERS_OBJECTS = 49, 12
 _RECORDED_READINGS = (
     "Readings are own recordings of a real sensor, not the paper's, so none of its numbers is judged on them. That a "
     "recorded object is that of its mesh, that it lay where the study presses it, and the order of the taxels are taken as stated: "
     "nothing here checks them.")
-# Errors of the meshes' maps at 50 N: root mean square, and at single points (docs/explanation/discretisation.md).
+# Errors of the maps of the meshes at 50 N: root mean square, and at single points (docs/explanation/discretisation.md).
 MESH_ERRORS = {"draft": "2 to 5 % of its largest value in the root mean square and up to 10 % at single points",
                "default": "up to 2 % of its largest value in the root mean square and up to 5 % at single points"}
 
 
 def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Path, run: pd.DataFrame) -> str:
-    """The page as text; `inputs` and `settings` as in the stage, links relative to `folder`, run as of `run_record`."""
+    """The page as text. `inputs` and `settings`: as in the stage; links are relative to `folder`; run: of `run_record`."""
     ftir = read_json(inputs["ftir"])
     archive = read_json(inputs["inventory"]) if "inventory" in inputs else None
     page = Page("Simulating a soft tactile sensor: the study", settings["study"], folder=folder)
@@ -169,7 +169,7 @@ def _facts(settings):
 
 
 def _archive_facts(settings, archive):
-    """What replaces the presses of a study on the published archive."""
+    """The facts of a study on the published archive, in place of its presses."""
     items = archive["items"]
     return (f"Maps and readings are those of the published archive: {archive['tests_used']} of {archive['tests']} tests of "
             f"{len(items['indenters'])} indenters, {len(items['unseen'])} held-out ones (our choice: the paper does not name its "
@@ -198,7 +198,7 @@ def _synthetic(ftir, settings):
 
 
 def missing(settings: dict[str, Any], *, archive: bool) -> list[str]:
-    """Sentences on a study of presses, or of the published archive; settings as of the stage `report`."""
+    """Sentences on the differences from the paper of a study of presses, or of the archive; settings: of the stage `report`."""
     return _beside_archive(settings) if archive else _of_presses(settings)
 
 
@@ -234,7 +234,7 @@ def _sizes(settings):
 
 
 def _mesh(config):
-    """The error of the tested hyperelastic model's mesh, if it is one of those that were measured."""
+    """A sentence on the error of the tested hyperelastic model's mesh, if it was measured."""
     presets = {name: model.get("mesh", {}).get("preset") or "default" for name, model in config.get("models", {}).items()
                if name in config.get("tested", ()) and model.get("kind", "hyperelastic") == "hyperelastic"}
     return [f"Mesh: the {preset} one of the {name} model puts its map off by {MESH_ERRORS[preset]}."
@@ -253,7 +253,7 @@ def _seeds(settings):
 
 
 def result_table(scores: pd.DataFrame) -> pd.DataFrame:
-    """Of a `score_table` the grasped objects at the largest force, the paper's test 2, and over all forces, in words."""
+    """The rows of a `score_table` for grasped objects at the largest force (the paper's test 2) and over all forces, in words."""
     forces = forces_of(scores)
     rows = scores[(scores["set"] == "grasps") & scores.force.isin([forces[-1], ALL_FORCES])]
     shown = rows.assign(predictor=rows.predictor.map(PREDICTORS), kind=rows.kind.map(KINDS), force=rows.force.map(force_in_words))
@@ -271,7 +271,7 @@ def _summary(summary):
 
 
 def _in_words(frame):
-    """A table with the names of its file in words."""
+    """A table with the names of its columns and values in words."""
     frame = _summary(frame) if {"ssim_low", "ssim_high"} <= set(frame) else frame
     words = {"predictor": PREDICTORS, "kind": KINDS, "set": SETS}
     return frame.assign(**{name: frame[name].map(lambda value, known=known: known.get(value, value))

@@ -1,4 +1,4 @@
-"""Tables 1 to 3: what was fitted, what was chosen, how long it took, each beside the paper's numbers."""
+"""Tables 1 to 3, with the paper's numbers: fitted laws, chosen models, times."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -11,7 +11,7 @@ from softtact.reporting.run_record import machine
 Counts = tuple[int, int, int, int, str]
 Times = tuple[float, float, float, float]
 
-# Table 2 of the paper: NPt, CHt, NPo, CHo, and the pipeline that it chose.
+# Table 2 of the paper: NPt, CHt, NPo, CHo, and the chosen pipeline.
 PRINTED_COUNTS: dict[str, Counts] = {
     "object_1": (1356, 231, 51, 36, "elastic"), "object_2": (13830, 15537, 1205, 3444, "elastic"),
     "object_3": (1932, 1348, 64, 105, "elastic"), "object_4": (5472, 1449, 164, 141, "elastic"),
@@ -21,7 +21,7 @@ PRINTED_TIMES: dict[str, Times] = {"hyperelastic": (162.1, 48.0, 1863.0, 110.9),
 
 
 def table1_materials(cards: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """A row per material and law: parameters, errors, stability, what the data leave open, the paper's constants and RMSE."""
+    """A row per material and law: parameters, errors, stability, undetermined parameters, the paper's constants and RMSE."""
     rows = []
     for card in cards:
         for law, fit in card["laws"].items():
@@ -38,7 +38,7 @@ def table1_materials(cards: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
 
 def contradictions(cards: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """A row per contradiction among the constants that a publication prints, with its numbers."""
+    """A row per contradiction among the printed constants of a publication, with its numbers."""
     rows = [{"material": card["material"], "contradiction": text.removeprefix(PRINTED)}
             for card in cards for text in card["warnings"] if text.startswith(PRINTED)]
     return pd.DataFrame(rows, columns=["material", "contradiction"])
@@ -54,7 +54,7 @@ def table2_complexity(complexity: pd.DataFrame, choose: Callable[..., str]) -> p
 
 
 def table3_timing(timing: pd.DataFrame) -> pd.DataFrame:
-    """Seconds per map and model: ours with its machine, and the paper's; that alone where nothing was pressed."""
+    """Seconds per map and model: ours (if objects were pressed) with its machine, and the paper's."""
     rows = []
     timing = timing.assign(total_s=timing.solver_s + timing.network_s)
     for model in sorted(set(timing.model)) or sorted(PRINTED_TIMES):

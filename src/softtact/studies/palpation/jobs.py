@@ -1,9 +1,9 @@
 """The jobs of a study of a palpation sensor.
 
     TISSUE_SCENARIO.nc, fields_TISSUE.vtu  a sweep of the jaw, and the last step for ParaView
-    sweeps/*.nc, hardness/*.csv            sweeps on a coarser mesh and under other assumptions, and for the study of hardness
+    sweeps/*.nc, hardness/*.csv            sweeps on a coarser mesh and with other assumptions, and for the study of hardness
     lump/lumps.nc                          film forces over lumps
-    tables/*.csv, facts/*.json             what is made of them; sentences for people are made of the facts
+    tables/*.csv, facts/*.json             their summaries; the report's sentences use the facts
     figures/, summary.json, report.html
 """
 
@@ -17,8 +17,8 @@ import numpy as np
 from softtact.probe.design import PalpationDesign, check_design
 from softtact.studies.jobs import Job, figure_files, files_made
 
-_COARSER = 2.0     # times the mesh's sizes: the second mesh, for the mesh error
-_OF_STUDIES = {"variants", "variant_steps", "hardness", "search", "load_n", "displacement_mm"}     # a sweep does without
+_COARSER = 2.0     # factor of the element sizes of the second mesh, for the mesh error
+_OF_STUDIES = {"variants", "variant_steps", "hardness", "search", "load_n", "displacement_mm"}     # not of a sweep
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class PalpationStudy:
 
     @property
     def name(self) -> str:
-        """Of its folder below results/."""
+        """Name of its folder below results/."""
         return self.design.name
 
 
 def load(values: Mapping[str, Any], path: str | Path | None) -> PalpationStudy:
-    """The study of a design's keys and values, read from a file; the first fault becomes an InputError of one sentence."""
+    """The study of a design's keys and values from a file; raises an InputError of one sentence for the first fault."""
     return PalpationStudy(check_design(values, path or "design.yaml"))
 
 
 def jobs(study: PalpationStudy, folder: str | Path) -> list[Job]:
-    """All jobs of a study whose results lie in a folder, in an order in which they can run."""
+    """All jobs of a study with results in a folder, in an order in which they can run."""
     design, folder = study.design, str(folder)
     main, coarse, variants = _main_sweeps(design, folder), _coarse_sweeps(design, folder), _variant_sweeps(design, folder)
     hardness = _hardness(design, folder)
@@ -61,9 +61,9 @@ def _sweep(design: PalpationDesign, folder: str, name: str, tissue: str, scenari
 
 
 def _of_one_tissue(design: PalpationDesign, tissue: str) -> dict[str, Any]:
-    """The values that a sweep over a tissue uses of a design."""
+    """The values of a design that a sweep over a tissue uses."""
     values = design.model_dump(mode="json", exclude=_OF_STUDIES, exclude_none=True)
-    steps = {"to": 0.5 * design.geometry.tissue_height, "by": 1.0}     # the model needs both; the settings hold a sweep's steps
+    steps = {"to": 0.5 * design.geometry.tissue_height, "by": 1.0}     # required keys; a sweep has its steps in its settings
     return values | {"tissues": {tissue: values["tissues"][tissue]}, "load_n": steps, "displacement_mm": steps}
 
 
@@ -74,14 +74,14 @@ def _main_sweeps(design, folder):
 
 
 def _coarse_sweeps(design, folder):
-    """The sweeps of the displacement on elements that are larger."""
+    """The sweeps of the displacement on a coarser mesh."""
     coarse = design.with_(mesh={name: _COARSER * getattr(design.mesh, name) for name in ("along", "tissue", "base")})
     return [_sweep(coarse, folder, f"sweeps/coarse_{tissue}", tissue, "displacement", design.displacement_mm.values)
             for tissue in design.tissues]
 
 
 def _variant_sweeps(design, folder):
-    """{(variant, tissue): job} under each variant's assumptions, and under the design's, by fewer steps."""
+    """{(variant, tissue): job} with the assumptions of each variant and of the design, in fewer steps."""
     if not design.variants:
         return {}
     found = {}
@@ -139,7 +139,7 @@ def _search(design, folder):
 
 
 def _report(design, folder, made):
-    """The page, from all that the other jobs made for people."""
+    """The report, from the results of all other jobs."""
     chosen = {name: files_made(made, f"{folder}/{start}", end) for name, start, end in (
         ("tables", "tables/", ""), ("figures", "figures/", ".png"), ("facts", "facts/", ""), ("fields", "fields_", ""))}
     main = [f"{folder}/{tissue}_{scenario}.nc" for scenario in ("displacement", "load") for tissue in design.tissues]

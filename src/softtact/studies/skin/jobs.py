@@ -1,9 +1,9 @@
 """The jobs of a study of a robot skin.
 
-    loads/load_N.nc                        load N, where it is an object that presses at finite strains
+    loads/load_N.nc                        load N, if it is an object pressed at finite strains
     readings.nc, tables/loads.csv          deformation, capacitances and counts under all loads
-    tables/*.csv, facts/*.json             what each section of the design asks for; sentences for people are made of the facts
-    search/*.json                          what all elastomers do at one thickness and radius
+    tables/*.csv, facts/*.json             results of each section of the design; the report's sentences use the facts
+    search/*.json                          results of all elastomers at one thickness and radius
     exports/, figures/, report.html
 """
 
@@ -31,30 +31,30 @@ class SkinStudy:
     """A checked design."""
 
     name: str
-    """Of its folder below results/."""
+    """Name of its folder below results/."""
     prepared: PreparedDesign
     folder: Path
-    """From which the design names files."""
+    """Folder to which the design's paths are relative."""
 
     @property
     def design(self) -> SkinDesign:
-        """The design as it is written."""
+        """The validated design."""
         return self.prepared.design
 
     def path(self, file: str) -> str:
-        """A file that the design names, as a path from the working folder where it lies below that."""
+        """The path of a file of the design, relative to the working folder if it lies below it."""
         return from_here(self.folder / file)
 
 
 def load(values: Mapping[str, Any], path: str | Path | None) -> SkinStudy:
-    """The study of a design's keys and values, read from a file; the first fault becomes an InputError of one sentence."""
+    """The study of a design's keys and values from a file; raises an InputError of one sentence for the first fault."""
     path = Path(path or "design.yaml")
     design = check_design(values, path)
     return SkinStudy(design.study or path.stem, prepare(design, path), path.parent)
 
 
 def jobs(study: SkinStudy, folder: str | Path) -> list[Job]:
-    """All jobs of a study whose results lie in a folder, in an order in which they can run."""
+    """All jobs of a study with results in a folder, in an order in which they can run."""
     design, folder = study.design, str(folder)
     made = _loads(study, folder)
     for wanted, part in ((design.probes, _probes), (design.choice, _choice), (design.maps, _maps), (design.search, _search),
@@ -70,13 +70,13 @@ def jobs(study: SkinStudy, folder: str | Path) -> list[Job]:
 
 
 def _loads(study, folder):
-    """The loads, and what the skin reads under them."""
+    """The jobs of the loads and of the readings under them."""
     design = study.design
     made, pressed, files, settings = [], [], [], []
     for number, choice in enumerate(design.loads, start=1):
         values = choice.model_dump(mode="json", exclude_defaults=True)
         file = choice.mesh or choice.mask
-        if file:     # its path is an input, and no setting
+        if file:     # its path is an input, not a setting
             values |= {"mesh" if choice.mesh else "mask": Path(file).name}
         settings.append(values)
         if choice.strains == "finite":
@@ -126,7 +126,7 @@ def _maps(study, folder):
 
 
 def _search(study, folder):
-    """A job for each thickness and radius, whose mesh serves all elastomers of one Poisson's ratio; and what ranks all designs."""
+    """A job for each thickness and radius, whose mesh serves all elastomers of a Poisson's ratio, and one to rank all designs."""
     space, choice, module = study.design.search, study.design.choice or Choice(), study.design.module
     names = space.elastomers or [name for name, one in study.prepared.elastomers.items() if bears(one, 1e-3 * choice.range_kpa[1])]
     common = {"elastomers": [study.prepared.elastomers[name].model_dump(mode="json") for name in names],
@@ -153,7 +153,7 @@ def _link(study, folder):
 
 
 def _report(study, folder, made):
-    """The page, from all that the other jobs made for people."""
+    """The report, from the results of all other jobs."""
     shown = {name: files_made(made, f"{folder}/{name}/", ".png" if name == "figures" else "")
              for name in ("tables", "figures", "facts", "exports")}
     return Job("report", shown | {"readings": f"{folder}/readings.nc"},
@@ -183,5 +183,5 @@ def _tables(stage, folder):
 
 
 def _fields(study, times):
-    """Solved fields, in those of one module."""
+    """Work of the solved fields, in units of a field of one module."""
     return times * len(study.prepared.layout.corners_mm)

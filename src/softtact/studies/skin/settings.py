@@ -13,27 +13,27 @@ _PARTS = ("module", "patch", "mesh")
 
 
 def design_of(settings: Settings) -> SkinDesign:
-    """The design of `module`, `patch` and `mesh`, as far as they are among the settings, without loads."""
+    """A design with the settings `module`, `patch` and `mesh` if given, without loads."""
     return SkinDesign.model_validate({"skin": "", "loads": []} | {name: settings[name] for name in _PARTS if name in settings})
 
 
 def skin_of(settings: Settings, threads: int, *, layout: Layout | None = None) -> Skin:
-    """The layer of `elastomer` on the taxels of a design, or on those of another layout."""
+    """The layer of `elastomer` on the taxels of a design or of another layout."""
     design, elastomer = design_of(settings), elastomer_of(settings)
     return Skin(layout or design.layout(), thickness_mm=design.module.thickness_mm, poisson=elastomer.poisson,
                 permittivity=elastomer.permittivity_fe, mesh=design.mesh.sizes(), threads=threads)
 
 
 def elastomer_of(settings: Settings) -> Elastomer:
-    """The elastomer of the fields `elastomer`."""
+    """The elastomer in the setting `elastomer`."""
     return Elastomer.model_validate(settings["elastomer"])
 
 
 def elastomers_of(settings: Settings) -> dict[str, Elastomer]:
-    """Elastomers by name, from the list `elastomers`."""
+    """Elastomers by name in the setting `elastomers`, a list."""
     return {values["name"]: Elastomer.model_validate(values) for values in settings["elastomers"]}
 
 
 def converter_of(settings: Settings) -> Converter:
-    """The converter of the fields `converter`."""
+    """The converter in the setting `converter`."""
     return Converter(**settings["converter"] | {"range_pf": tuple(settings["converter"]["range_pf"])})

@@ -1,4 +1,4 @@
-"""Objects in the robot's hand, the presses of what touches the sensors, and the readings of these."""
+"""Stages that grasp objects with the robot, press them on the sensors, and read these."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,9 +21,9 @@ GRIP = 1     # number of the event `grip` in `softtact.robot.events.EVENTS`
 def grasp(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Grasp one object in one position, and press it on both sensors at the grasp's events.
 
-    inputs: object (mesh), sensor (YAML), materials (YAML of its layers), mjcf of the robot where it is not the one that ships
+    inputs: object (mesh), sensor (YAML), materials (YAML of its layers), mjcf of the robot unless it is the default
     outputs: events (NetCDF);  settings: object, unit, x_mm, y_mm, angle_deg, force_n, model, policy, mesh, scene
-    A grasp that fails is a result of the study: `events` then has the attribute `failed`, a sentence, and no data.
+    A failed grasp is a result of the study: `events` then has an attribute `failed`, a sentence, and no data.
     """
     import xarray
 
@@ -45,7 +45,7 @@ def grasp(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
 
 
 def read_grasp(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Read both sensors at the event `grip` of one grasp: two specimens of the virtual sensor; nothing of a grasp that failed.
+    """Read both sensors, two specimens of the virtual sensor, at the event `grip` of a grasp; no readings of a failed grasp.
 
     inputs: events (NetCDF), sensor (YAML);  outputs: readings (NetCDF);  settings: item, force_n, trials, seed, virtual_sensor
     """
@@ -63,7 +63,8 @@ def one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     """Press one event of an object with several models: maps (model, y, x) of the left sensor.
 
     inputs: as of `grasp`;  outputs: maps (NetCDF), in which `lower_share` is the deformation under the features 0.5 mm above the
-    lowest ones over that under these (`evaluation.features`);  settings: object, unit, force_n, models, cover_law, mesh, scene
+    lowest ones over that under the lowest ones (`evaluation.curve_shape`)
+    settings: object, unit, force_n, models, cover_law, mesh, scene
     """
     import xarray
 
@@ -109,7 +110,7 @@ def _readings(spec, events, settings):
 
 
 def study_sensor(path: Path, mesh: str, *, cover_law: str | None = None) -> "Sensor":
-    """The sensor with a preset of the hyperelastic mesh, on a cover of the constants that are printed for a law."""
+    """The sensor with a preset of the hyperelastic mesh, and a cover with the printed constants of a law."""
     from dataclasses import replace
 
     from softtact.materials.config import law_from_printed

@@ -1,4 +1,4 @@
-"""What all grasps of a study show together: their table, the paper's claims, figures, the report."""
+"""Summary of all grasps of a study: table, the paper's claims, figures, report."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -47,7 +47,7 @@ def tabulate_grasps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings
 
 
 def draw_grasped_objects(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Draw each object's first grasp that was done: the hand, and what both sensors feel.
+    """Draw the first successful grasp of each object: the hand, and maps and readings of both sensors.
 
     inputs: events, readings, objects (lists, in the grasps' order), sensor (YAML), materials;  outputs: png
     settings: items, mesh, scene
@@ -62,7 +62,7 @@ def draw_grasped_objects(*, inputs: dict[str, Any], outputs: dict[str, Any], set
 
 
 def draw_one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Draw the maps that several models make of one event: a row for each object, one scale a row.
+    """Draw the maps of several models for one event: a row for each object, with one scale per row.
 
     inputs: compared (list);  outputs: png
     """
@@ -102,7 +102,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
 
 
 def papers_model(placed: "trimesh.Trimesh", *, footprint_mm: tuple[float, float], reach_mm: float) -> str:
-    """The model that the paper's rule takes for an object that is placed over the pad: what of it is over the pad counts."""
+    """The model that the paper's rule chooses for a placed object, by the part of it over the pad."""
     from softtact.geometry.complexity import choose_model, score
 
     counts = score(placed.triangles, footprint_mm=footprint_mm, reach_mm=reach_mm)
@@ -115,7 +115,7 @@ def _compared(inputs):
 
 
 def _facts(data, readings, mesh, spec):
-    """The values of a row of the table, for a grasp that was done."""
+    """The values of a row of the table, for a successful grasp."""
     from softtact.geometry.meshes import place
     from softtact.robot.events import pose_of, set_down
 
@@ -136,7 +136,7 @@ def _facts(data, readings, mesh, spec):
 
 
 def _pictures(events, files, sensor: Path, settings) -> Iterator[tuple[str, np.ndarray]]:
-    """(object, image of the hand at the grip) of each object; nothing where MuJoCo does not draw."""
+    """(object, image of the hand at the grip) of each object; none if MuJoCo cannot render."""
     from softtact.geometry.meshes import read_mesh
     from softtact.robot.settings import import_mujoco
 
@@ -162,7 +162,7 @@ def _draw_objects(path: Path, events: Mapping[str, "xarray.Dataset"], readings: 
                  pictures: Mapping[str, np.ndarray]) -> None:
     """Write a PNG with a column for each object at the grip: robot, maps of both sensors, the virtual sensor's mean readings.
 
-    pictures: {object: image (height, width, 3)}, empty where MuJoCo does not draw
+    pictures: {object: image (height, width, 3)}, empty if MuJoCo cannot render
     """
     names = list(events)[:2 * _MOST_COLUMNS]
     if not names:
@@ -202,7 +202,7 @@ def _draw_column(axes, name, data, read, picture, *, with_picture, figure):
 
 
 def _result(grasps):
-    """How many grasps were done, and whether their models are valid, in sentences."""
+    """Sentences on the number of successful grasps and on the validity of their models."""
     done = grasps[grasps.status == "done"]
     objects, trials = (done.object.nunique(), int(done.trials.sum())) if len(done) else (0, 0)
     result = f"{len(done)} of {len(grasps)} grasps done, {objects} objects, {trials} trials."

@@ -1,4 +1,4 @@
-"""Figure 10: SSIM against the number of training maps, a panel a set."""
+"""Figure 10: SSIM against the number of training maps, one panel per set."""
 
 from typing import TYPE_CHECKING
 
@@ -8,18 +8,18 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-MARKS = {"elastic": "s", "foundation": "D", "hyperelastic": "o"}      # apart in grey too
+MARKS = {"elastic": "s", "foundation": "D", "hyperelastic": "o"}      # distinct in grey, too
 
 
 def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame") -> "Figure":
-    """Figure of the learning_curve.csv of all models in one frame, and of ceiling.csv."""
+    """Figure from one frame with the learning_curve.csv of all models, and ceiling.csv."""
     plt = pyplot()
     sets = list(curves["set"].unique())
     figure, panels = plt.subplots(1, len(sets), figsize=(3.6 * len(sets), 4.2), sharey=True, squeeze=False, layout="constrained")
     for axes, name in zip(panels[0], sets, strict=True):
         _draw_set(axes, curves[curves["set"] == name])
         repeated = ceiling[ceiling["set"] == name].ssim.mean()
-        if repeated == repeated:     # a sensor that was read once has none
+        if repeated == repeated:     # nan for a sensor that was read once
             axes.axhline(repeated, color="k", lw=1, ls=":", label="sensor against itself")
         axes.set(title=name, xlabel="training maps with their readings", xscale="log")
         sizes = sorted(curves.maps.unique())
@@ -33,7 +33,7 @@ def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame") -> "Figure":
 def _draw_set(axes, curves):
     kinds = list(curves.groupby(["model", "architecture"], sort=False))
     for k, ((model, architecture), rows) in enumerate(kinds):
-        beside = 1.03 ** (k - 0.5 * (len(kinds) - 1))     # intervals of one number of maps stand beside each other
+        beside = 1.03 ** (k - 0.5 * (len(kinds) - 1))     # shifts intervals at the same number of maps apart
         spread = [rows.ssim - rows.ssim_low, rows.ssim_high - rows.ssim]
         axes.errorbar(rows.maps * beside, rows.ssim, yerr=spread, color=colour(model), ls=ARCHITECTURE_LINES[architecture],
                       lw=1.4, ms=5, marker=MARKS.get(model, "^"), capsize=3, elinewidth=0.8, label=f"{model}, {architecture}")

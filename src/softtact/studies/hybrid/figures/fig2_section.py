@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import SensorSpec
     from softtact.studies.hybrid.figures.section import CutBody
 
-# Light to dark from the cover down: apart in grey, too.
+# Light to dark from the cover down: distinct in grey, too.
 _COLOURS = {"cover": "#f2d6b3", "sheet": "#6fa8c9", "frusta": "#1f4e79"}
 _NAMES = {"cover": "cover and fabric", "sheet": "dielectric's sheet", "frusta": "frusta"}
 _CLOSE_PITCHES = 1.9      # on either side of the deepest place, in the close-ups
@@ -23,7 +23,7 @@ _CLOSE_PITCHES = 1.9      # on either side of the deepest place, in the close-up
 
 def draw(section: "CutBody", outline: Sequence[np.ndarray], *, spec: "SensorSpec", summary: dict[str, Any],
          y_mm: float) -> "Figure":
-    """Figure of a `CutBody`; outline: polygons (k, 2) of the object in its plane where the press took it."""
+    """Figure of a `CutBody`; outline: polygons (k, 2) of the pressed object in the same plane."""
     plt = pyplot()
     figure = plt.figure(figsize=(11, 6.9), layout="constrained")
     rows = figure.add_gridspec(3, 2, height_ratios=(1, 1, 1.25))
@@ -64,7 +64,7 @@ def _draw_layers(axes, polygons, region):
 
 
 def _deepest(section):
-    """x (mm) of the place of the frusta that went down most."""
+    """x (mm) where the frusta are displaced most."""
     frusta = [(rest, pressed) for rest, pressed, where in zip(section.rest_mm, section.pressed_mm, section.region, strict=True)
               if where == LAYERS["frusta"]]
     down = [float((rest[:, 1] - pressed[:, 1]).max()) for rest, pressed in frusta]

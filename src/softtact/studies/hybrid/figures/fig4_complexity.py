@@ -1,4 +1,4 @@
-"""Figure 4: meshes and hulls of two objects, whole and where the sensor can touch, and the ratios that choose the model."""
+"""Figure 4: meshes and hulls of two objects, whole and in reach of the sensor, and the ratios that choose the model."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.geometry.complexity import overlap_points
-from softtact.reporting.render import Part, View, add_view, part_of, rendered, tell_fallback
+from softtact.reporting.render import Part, View, add_view, note_fallback, part_of, rendered
 from softtact.reporting.style import colour, pyplot
 
 if TYPE_CHECKING:
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.figure import Figure
 
-PRINTED = ("object_3", "object_6")     # what the paper's figure shows: a flat cylinder and a detailed one
+PRINTED = ("object_3", "object_6")     # those of the paper's figure: a flat cylinder and a detailed object
 _OUTSIDE = 1.015                       # times the hull's size
 _BELOW = {"seen_from": (0.55, -0.9, -0.9), "up": (0.0, 0.0, -1.0)}     # the side that touches
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A mesh (trimesh) in the sensor's frame, and what of it counts as the overlap."""
+    """A mesh (trimesh) in the sensor's frame, and the limits of its overlap with the sensor."""
 
     mesh: "trimesh.Trimesh"
     footprint_mm: tuple[float, float]
@@ -44,12 +44,12 @@ def draw(complexity: "pd.DataFrame", placed: dict[str, Placed], *, thresholds: d
             axes = add_view(figure, grid[r, k], views[2 * k + r], images and images[2 * k + r])
             axes.set_title(title, fontsize=9)
     _draw_ratios(figure.add_subplot(grid[:, -1]), complexity, thresholds)
-    tell_fallback(figure, images)
+    note_fallback(figure, images)
     return figure
 
 
 def chosen_objects(complexity: "pd.DataFrame", placed: dict[str, Placed]) -> list[str]:
-    """The paper's two where both are here, else the first of each chosen model."""
+    """The paper's two objects if both exist, else the first object of each chosen model."""
     if all(name in placed and (complexity.object == name).any() for name in PRINTED):
         return list(PRINTED)
     return list(complexity[complexity.object.isin(list(placed))].drop_duplicates("model").object)
@@ -61,7 +61,7 @@ def _whole(placed, model):
 
 
 def _overlap(placed, model):
-    """The part that the sensor can touch in the pale rest, and the edges of the hull of the mesh's points there."""
+    """The part in reach of the sensor, the pale remainder, and the hull's edges of the mesh's points in reach."""
     points = overlap_points(placed.mesh.triangles, footprint_mm=placed.footprint_mm, reach_mm=placed.reach_mm)
     parts = [part_of(placed.mesh, colour="#d5d8dc", opacity=0.25)]
     if len(points):
@@ -70,7 +70,7 @@ def _overlap(placed, model):
 
 
 def _within(placed, lowest):
-    """`Part` of the mesh, cut to the footprint and to what is at most the reach above its lowest point there."""
+    """`Part` of the mesh inside the footprint and at most the reach above its lowest point there."""
     import pyvista
 
     x, y = (0.5 * side for side in placed.footprint_mm)
@@ -83,7 +83,7 @@ def _within(placed, lowest):
 
 
 def _hull(points, model):
-    """The edges of points' convex hull, a little outside so that they are seen; None where the points lie in a plane."""
+    """The edges of the points' convex hull, slightly enlarged to be visible; None if the points lie in a plane."""
     import trimesh
     from scipy.spatial import QhullError
 
@@ -116,7 +116,7 @@ def _draw_ratios(axes, complexity, thresholds):
 
 
 def _label_objects(axes, names, x, y):
-    """Number the objects of figure 7 in their first pose; those at the same place share one label."""
+    """Number the objects of figure 7 in their first pose; objects at the same point share a label."""
     places = {}
     for name, a, b in zip(names, x, y, strict=True):
         if name.startswith("object_") and "-" not in name:

@@ -8,13 +8,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-_MODEL, _MEASURED = "#1f4e79", "#e08214"     # apart in grey and to the colour-blind; markers differ, too
-_STROKES = (("--", 1.0), ((0, (1, 4)), 2.4), ("-", 0.7), ("-.", 1.0))     # two that coincide are both seen
-_FAR = 1.5                                   # times the largest area of the main curves: drawn in a separate panel above
+_MODEL, _MEASURED = "#1f4e79", "#e08214"     # distinct in grey and for the colour-blind; markers differ, too
+_STROKES = (("--", 1.0), ((0, (1, 4)), 2.4), ("-", 0.7), ("-.", 1.0))     # so that two coinciding lines are both visible
+_FAR = 1.5                                   # times the largest main area; higher curves are drawn in a separate panel
 
 
 def draw(area: "pd.DataFrame", summary: dict[str, Any], *, orientations: "pd.DataFrame | None" = None) -> "Figure":
-    """Figure from contact_area.csv, its summary, and orientations.csv (all orientations and laws), if there is one."""
+    """Figure from contact_area.csv, its summary and, if given, orientations.csv (all orientations and laws)."""
     main = ["area_per_frustum_mm2", "area_measured_mm2", "area_image_mm2"]
     others = [] if orientations is None else _others(orientations, summary["under_test"])
     bound = _FAR * area[main].to_numpy().max()
@@ -42,7 +42,7 @@ def draw(area: "pd.DataFrame", summary: dict[str, Any], *, orientations: "pd.Dat
 
 
 def _panels(far):
-    """Figure and its panels from above: one, or a low one for far larger areas over the main one."""
+    """Figure and its panels from the top: the main one, with a low one above it for much larger areas if needed."""
     if not far:
         figure, axes = pyplot().subplots(figsize=(6.6, 4.8), layout="constrained")
         return figure, [axes]
@@ -53,7 +53,7 @@ def _panels(far):
 
 
 def _total_on_the_right(panels, count):
-    """A second scale of `count` frusta on every panel."""
+    """A second scale, the total of `count` frusta, on every panel."""
     for panel in panels:
         second = panel.secondary_yaxis("right", functions=(lambda a: a * count, lambda a: a / count))
         second.spines["right"].set_visible(True)

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# Marks of the predictors without a network: the same for both models where they do not look at the map, else of the model shown.
+# Marks of the predictors without a network: those that ignore the map are the same for both models, others are of SHOWN_MODEL.
 BASELINES = {"zeros": "x", "mean_reading": "_", "nearest_map": "1", "ridge": "+", "quadratic": "^", "gap_formula": "D"}
-SHOWN_MODEL = "hyperelastic"     # whose maps the baselines take, where the study has them
+SHOWN_MODEL = "hyperelastic"     # its maps are the input of the baselines, if the study has them
 
 
 def draw(ssim: "pd.DataFrame", ceiling: "pd.DataFrame", baselines: "pd.DataFrame | None" = None, *,
          choices: dict[str, Any] | None = None) -> "Figure":
-    """Figure from ssim.csv, ceiling.csv and baselines.csv; one panel a set of test data.
+    """Figure from ssim.csv, ceiling.csv and baselines.csv; one panel per set of test data.
 
     choices: {window, data_range} of the SSIM
     """
@@ -61,7 +61,7 @@ def _draw_set(axis, rows, ceiling, name):
         axis.boxplot(groups, positions=at, widths=0.6 * width, manage_ticks=False, showfliers=False,
                      medianprops={"color": "k"})
     repeated = [ceiling[ceiling.item == item].ssim.mean() for item in items]
-    if np.isfinite(repeated).any():     # an archive does not state which readings repeat which
+    if np.isfinite(repeated).any():     # missing for an archive, which does not state repetitions
         axis.plot(np.arange(len(items)), repeated, "k_", ms=14, label="sensor against itself")
     axis.set_xticks(range(len(items)), [i.replace("_", " ") for i in items], rotation=60, ha="right")
     means = ", ".join(f"{rows[rows.model == model].ssim.mean():.2f}" for model in models)

@@ -1,11 +1,11 @@
-"""Figure 7: objects x (view, deformation maps, tactile maps of both models and of the sensor) at the largest force."""
+"""Figure 7: for each object a view, deformation maps, and tactile maps of both models and the sensor at the largest force."""
 
 
 from collections.abc import Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from softtact.reporting.render import View, add_view, part_of, rendered, tell_fallback
+from softtact.reporting.render import View, add_view, note_fallback, part_of, rendered
 from softtact.reporting.style import draw_map, pyplot
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ def draw(objects: Sequence[dict[str, Any]], *, largest_counts: float) -> "Figure
     """Figure from a list of objects.
 
     Each {name, mesh, chosen, deformation {model: (y, x)} in mm, tactile {model: (row, column)} in counts, sensor (row, column),
-    source (of its readings), trials (that their mean is of), extent, force}.
-    largest_counts: where the colours of tactile maps end
+    source (of its readings), trials (in their mean), extent, force}.
+    largest_counts: upper end of the colour scale of tactile maps
     """
     plt = pyplot()
     models = list(objects[0]["deformation"])
@@ -49,7 +49,7 @@ def draw(objects: Sequence[dict[str, Any]], *, largest_counts: float) -> "Figure
     figure.colorbar(counts, ax=figure.axes[-1], label="counts", shrink=0.8)
     figure.suptitle(f"{objects[0]['force']:g} N; maps turned 90 degrees counter-clockwise; red: the model that the complexity "
                     f"rule chose; sensor: mean of {_trials(objects)} trials")
-    tell_fallback(figure, images)
+    note_fallback(figure, images)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Figure 8: error against time of the policies that choose a model, and the error that was expected against the true one."""
+"""Figure 8: error against time of the policies that choose a model, and expected against true error."""
 
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 CALIBRATION_SET = "indenters"
 _BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
 _ABOVE = {"xytext": (5, 5), "ha": "left", "va": "bottom"}
-# Mark, colour, meaning and position of its texts, of each kind of policy; below and above, so that near ones stay apart.
+# For each kind of policy: mark, colour, meaning and position of its texts, below or above so that near ones do not overlap.
 _KINDS = {"always": ("s", "0.45", "always the same model", _BELOW), "paper": ("D", "#b22222", "the paper's rule", _ABOVE),
           "error": ("o", "#1f7a4d", "by expected error, tolerance of", _ABOVE)}
 
 
 def draw(policies: "pd.DataFrame", presses: "pd.DataFrame") -> "Figure":
-    """Figure of the tables of `compare_policies`: policies over the presses that were not calibrated on, and a row per press."""
+    """Figure from the tables of `compare_policies`: policies on presses outside the calibration, and a row per press."""
     plt = pyplot()
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
     _draw_policies(left, policies)
@@ -42,7 +42,7 @@ def _draw_policies(axes, policies):
 
 
 def _places(policies, *, width):
-    """{(time, error in um): text} of policies of one kind, those that would print over each other in one text."""
+    """{(time, error in um): text} of policies of one kind; overlapping texts are joined."""
     places = {}
     for _, row in policies.sort_values("mean_error_mm").iterrows():
         time, error = row.time_per_press_s, 1e3 * row.mean_error_mm
@@ -52,7 +52,7 @@ def _places(policies, *, width):
 
 
 def _in_short(names):
-    """What distinguishes policies of one kind: a model, or tolerances in rising order."""
+    """Short text for policies of one kind: a model, or tolerances in rising order."""
     if not names[0].startswith("error"):
         return ", ".join(name.removeprefix("always ") for name in names if name != "paper")
     return ", ".join(f"{tolerance:g}" for tolerance in sorted(float(name.split()[1]) for name in names)) + " um"
@@ -71,7 +71,7 @@ def _draw_expected(axes, presses):
     axes.plot([low, high], [low, high], color="0.6", lw=0.8)
     axes.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high), aspect="equal",
              xlabel="true error of a press, um", ylabel="expected error, um")
-    for axis in (axes.xaxis, axes.yaxis):     # by default each of 2 to 9 has its text, one over the other
+    for axis in (axes.xaxis, axes.yaxis):     # by default 2 to 9 all have texts, which overlap
         axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())

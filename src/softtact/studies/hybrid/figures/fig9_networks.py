@@ -1,4 +1,4 @@
-"""Figure 9: the architectures on the same split, by SSIM and by what they cost, and how each was trained."""
+"""Figure 9: the architectures on the same split with their SSIM and cost, and the history of each training."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -10,14 +10,14 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# Hatch and line mark the architecture, colour the model: they differ in grey, too.
+# Hatch and line style mark the architecture, colour the model: distinct in grey, too.
 HATCHES = {"printed": "", "searched": "..", "compact": "////"}
 NO_INTERVAL = "one item:\nno interval"
 
 
 def draw(networks: "pd.DataFrame", histories: "dict[tuple[str, str], pd.DataFrame]", *,
          choices: dict[str, Any] | None = None) -> "Figure":
-    """Figure of networks.csv and {(model, architecture): history.csv}; one model's printed and compact stand side by side.
+    """Figure from networks.csv and {(model, architecture): history.csv}; the architectures of a model are side by side.
 
     choices: {window, data_range} of the SSIM
     """

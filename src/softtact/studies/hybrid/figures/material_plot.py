@@ -1,4 +1,4 @@
-"""A material card as a picture: curves with the laws through them, what the laws leave, and where they are stable."""
+"""Plot a material card: test curves with the fitted laws, residuals, and stable ranges."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,14 +13,14 @@ from softtact.reporting.style import pyplot, save
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# The best laws get a line each; more would hide each other. Colours that differ in grey, and line styles beside them.
+# Only the best laws are drawn, because more lines would overlap. Colours are distinct in grey, and line styles differ.
 _LINES = (("#000000", "-"), ("#1f77b4", "--"), ("#e08214", "-."), ("#3f9c6d", ":"), ("#b2abd2", (0, (3, 1, 1, 1, 1, 1))))
-_BEYOND = 0.15      # of the window: so far beyond it go data and lines
+_BEYOND = 0.15      # of the window's range, by which data and lines may extend beyond it
 _MODE_COLOURS = {"uniaxial": "#1f4e79", "equibiaxial": "#e08214", "planar": "#3f9c6d"}
 
 
 def plot_material(card: dict[str, Any], curves: Sequence[Curve | VolumetricCurve], *paths: str | Path) -> None:
-    """Draw a card (dict) and the curves it was fitted to (list) to PNG or SVG files."""
+    """Draw a card (dict) and the curves it was fitted to (list) as PNG or SVG files."""
     save(draw_material(card, curves), *paths)
 
 
@@ -47,7 +47,7 @@ def draw_material(card: dict[str, Any], curves: Sequence[Curve | VolumetricCurve
 
 
 def _shown(card):
-    """The chosen law and the next best of the ranking."""
+    """The chosen law and the best others of the ranking."""
     others = [name for name in card["ranking"] if name != card["chosen"]]
     return [card["chosen"], *others][:len(_LINES)]
 
@@ -75,7 +75,7 @@ def _draw_shape(above, below, card, curve, names):
 
 
 def _draw_volume(above, below, card, curve, names):
-    """Pressure against volume, and what one bulk modulus leaves."""
+    """Pressure against volume, and the residual of a constant bulk modulus."""
     bulk = card["laws"][card["chosen"]]["bulk_modulus_mpa"]
     above.plot(curve.volume_ratio, curve.pressure, "o", ms=3, mfc="none", color="0.35")
     above.plot(curve.volume_ratio, bulk * (1 - curve.volume_ratio), "k-", lw=1.3)
@@ -87,7 +87,7 @@ def _draw_volume(above, below, card, curve, names):
 
 
 def _draw_ranges(axes, card):
-    """A bar per law and mode: the stretches at which the law is stable; the ticks across it bound that mode's data."""
+    """A bar per law and mode over the stretches at which the law is stable; ticks mark the range of that mode's data."""
     modes = list(_MODE_COLOURS)
     for row, name in enumerate(card["ranking"]):
         for k, mode in enumerate(modes):

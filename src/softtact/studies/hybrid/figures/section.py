@@ -1,7 +1,7 @@
-"""A section through the pressed sensor: the material that lies in a plane y = const at rest, and where the press takes it.
+"""A section through the pressed sensor: the material in a plane y = const at rest, and its displaced position.
 
-The curved elements are cut into small straight ones by their shape functions, with their displacements; a plane of VTK's
-then cuts these. No picture is rendered here.
+The curved elements are divided into small straight ones with their shape functions and displacements, which VTK then cuts with a
+plane. Nothing is rendered here.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run alon
 
 @dataclass(frozen=True)
 class CutBody:
-    """Polygons in a plane: rest_mm, pressed_mm lists of (k, 2), x and z; region (n,): their layers' numbers, by `LAYERS`."""
+    """Polygons in a plane: rest_mm, pressed_mm lists of (k, 2), x and z; region (n,): numbers of their layers by `LAYERS`."""
 
     rest_mm: list
     pressed_mm: list
@@ -38,7 +38,7 @@ def top_surface(mesh: PressedMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def row_under_load(mesh: PressedMesh, spec: "SensorSpec") -> float:
-    """y (mm) of the row of frusta under the place that went down most at the largest force."""
+    """y (mm) of the row of frusta under the largest displacement at the largest force."""
     nodes = mesh.points_of("sheet")
     deepest = mesh.points[nodes[np.argmin(mesh.displacement_mm[-1, nodes, 2])], 1]
     pitch, count = spec.dielectric.frusta.pitch_mm, spec.frusta_counts[1]
@@ -47,7 +47,7 @@ def row_under_load(mesh: PressedMesh, spec: "SensorSpec") -> float:
 
 
 def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> CutBody:
-    """The `CutBody` at y_mm of a `PressedMesh` at its largest force; each element cut into `parts` along each of its directions."""
+    """The `CutBody` at y_mm of a `PressedMesh` at its largest force; each element is divided into `parts` along each direction."""
     import pyvista
 
     plane = y_mm + _BESIDE_MM
@@ -55,10 +55,10 @@ def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> CutBody:
     for kind, nodes, region in mesh.cells:
         y = mesh.points[nodes, 1]
         nodes = nodes[(y.min(axis=1) < plane) & (y.max(axis=1) > plane)]
-        if region == LAYERS["pressed face"] or not len(nodes):     # the face is the cover's, which is cut as a solid
+        if region == LAYERS["pressed face"] or not len(nodes):     # a surface of the cover, which is cut as a solid
             continue
         if kind not in _LATTICES:
-            raise InputError(f"Cells of the kind {kind!r} are not cut; give a body that `Sensor.press(keep_body=True)` kept.")
+            raise InputError(f"Cells of the kind {kind!r} cannot be cut; give a body of `Sensor.press(keep_body=True)`.")
         points, moved, linear, cell_type = _refined(kind, mesh.points[nodes], mesh.displacement_mm[-1, nodes], parts)
         grid = pyvista.UnstructuredGrid({cell_type: linear}, points)
         grid["displacement"] = moved
@@ -72,7 +72,7 @@ def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> CutBody:
 
 
 def _refined(kind, points, displacement, parts):
-    """Points (n, 3), displacements (n, 3) and linear cells of elements (e, w, 3), with VTK's type of these cells."""
+    """Points (n, 3), displacements (n, 3) and linear cells of elements (e, w, 3), and the VTK type of these cells."""
     at, cells, values, cell_type = _LATTICES[kind](parts)
     numbers = cells[None] + (np.arange(len(points)) * len(at))[:, None, None]
     return (*(np.einsum("pw,ewd->epd", values, field).reshape(-1, 3) for field in (points, displacement)),

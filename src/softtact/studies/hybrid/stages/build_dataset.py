@@ -2,7 +2,7 @@
 
 inputs: presses (every model and item), tactile (every item); or folders of both with item_list (JSON), as `import_published` writes
 outputs: train, validation, unseen, grasps (each a list, one file per model, in the order of `models`), manifest
-settings: models, items [{set, item}] where they are no input, train_fraction, seed, training_trials (each | mean)
+settings: models, items [{set, item}] unless given as item_list, train_fraction, seed, training_trials (each | mean)
 """
 
 from typing import Any

@@ -1,9 +1,9 @@
-"""The study's networks and those trained beside them, on the same split, beside the predictors without a network.
+"""Compare the study's networks, those trained for comparison on the same split, and the predictors without a network.
 
 inputs: networks, timings, histories (of each network, in its order), validation, unseen, grasps (one per model each), baselines,
     ceiling
-outputs: networks, scores, levels (CSV), verdicts (JSON: sentences on what the study's networks are worth)
-settings: own (architecture), ssim, seed
+outputs: networks, scores, levels (CSV), verdicts (JSON: sentences on the study's networks)
+settings: architecture, ssim, seed
 """
 
 from typing import Any
@@ -33,4 +33,4 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
                                                     taxels=some.counts[0].size, seed=settings["seed"]))
     write_csv(outputs["scores"], table)
     write_csv(outputs["levels"], level_table(table))
-    write_json(outputs["verdicts"], {"sentences": verdicts(table, own=settings["own"])})
+    write_json(outputs["verdicts"], {"sentences": verdicts(table, architecture=settings["architecture"])})

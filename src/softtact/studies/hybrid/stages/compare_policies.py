@@ -1,4 +1,4 @@
-"""How the policies that choose a model do on presses made with all models.
+"""Compare the policies that choose a model, on presses with all models.
 
 inputs: elastic, foundation, hyperelastic (lists of presses, in the same order), complexity
 outputs: presses (a row per press), policies (a row per policy), calibration
@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.policies import CALIBRATION_SET, MODELS, policy_table, press_table, told_over_true
+from softtact.evaluation.policies import CALIBRATION_SET, MODELS, expected_over_true, policy_table, press_table
 from softtact.files import read_dataset, write_csv, write_json
 from softtact.sensors.specification import SensorSpec
 
@@ -28,4 +28,4 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     write_csv(outputs["policies"], policies)
     unseen = table[table.set.isin(others)]
     write_json(outputs["calibration"], {"foundation": asdict(calibrated), "tested_on": others,
-                                        "expected_over_true": {model: told_over_true(unseen, model) for model in MODELS[:2]}})
+                                        "expected_over_true": {model: expected_over_true(unseen, model) for model in MODELS[:2]}})

@@ -15,11 +15,11 @@ from softtact.imaging.frames import Camera, render_frame
 from softtact.imaging.reading import read_frame
 from softtact.progress import progress
 
-MARGIN_MM = 1.0   # of glass seen around the outermost frusta's centres
+MARGIN_MM = 1.0   # of glass visible around the outermost frusta's centres
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Render a frame per force, then detect in the written files as in a camera's."""
+    """Render a frame per force, then detect the discs in the written files as in those of a camera."""
     state, camera = read_dataset(inputs["states"][0]), Camera(**settings["camera"])
     x, y = state.x_mm.values, state.y_mm.values
     footprint = 2 * (abs(x).max() + MARGIN_MM), 2 * (abs(y).max() + MARGIN_MM)

@@ -1,6 +1,6 @@
-"""The figures: each is a stage named as its rule. It imports what it draws with itself, so that an edit of that redraws it alone.
+"""The figures, each a stage with the name of its rule. Each function imports its figure's module, so that an edit redraws only it.
 
-outputs: png, svg, or html of a view that turns
+outputs: png, svg, or html of an interactive view
 """
 
 from typing import Any
@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 
 Named = dict[str, Any]
-_LIFTED_MM = 6.0     # of the object above the surface, so that its imprint is seen
+_LIFTED_MM = 6.0     # of the object above the surface, so that its imprint is visible
 
 
 def draw_material(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
-    """The picture of a material's card: data, fits, residuals, stable ranges.
+    """The plot of a material's card: data, fits, residuals, stable ranges.
 
     inputs: card, curves (CSV, one per mode)
     """
@@ -44,7 +44,7 @@ def draw_fig2_section(*, inputs: Named, outputs: Named, settings: Named, threads
 
 
 def draw_pressed_sensor(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
-    """The sensor's surface at rest and pressed, with the object above it, as a view that turns in a browser.
+    """The sensor's surface at rest and pressed, with the object above it, as an interactive view for a browser.
 
     inputs: body (VTU), summary (JSON), object (mesh);  outputs: html;  settings: unit, pose
     """
@@ -68,7 +68,7 @@ def draw_pressed_sensor(*, inputs: Named, outputs: Named, settings: Named, threa
 
 
 def draw_fig4_complexity(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
-    """Figure 4: how detailed the grasped objects are.
+    """Figure 4: the complexity of the grasped objects.
 
     inputs: complexity, objects (list of meshes)
     settings: thresholds, objects [{name, unit, pose}, ...], footprint_mm, reach_mm
@@ -95,7 +95,7 @@ def draw_fig5_ftir(*, inputs: Named, outputs: Named, settings: Named, threads: i
 
 
 def draw_fig6_ssim(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
-    """Figure 6: SSIM of each object, the presses in several places together.
+    """Figure 6: SSIM of each object, over its presses at all places.
 
     inputs: ssim, ceiling, baselines;  settings: ssim {window, data_range}
     """
@@ -171,7 +171,7 @@ def _outline(mesh, y, depth):
 
 
 def _placed(path, entry):
-    """The mesh of a file, with the unit and in the pose of a mapping; without a pose centred over the sensor."""
+    """The mesh of a file in the unit and pose of a mapping; without a pose it is centred over the sensor."""
     from softtact.geometry.meshes import read_placed
 
     return read_placed(path, unit=entry["unit"], pose=entry["pose"])

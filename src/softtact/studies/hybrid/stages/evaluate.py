@@ -1,7 +1,7 @@
 """Scores and times of all networks.
 
 inputs: networks (one per model), validation, unseen, grasps (one per model each),
-    presses (of the models, for times; an archive has none)
+    presses (of the models, for times; none for an archive)
 outputs: ssim, per_item, summary, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
 """
 
@@ -18,7 +18,7 @@ from softtact.learning.training import prepare_torch
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Score every network on its three splits, score the sensor against itself, time every map."""
+    """Score every network on its three splits, measure the sensor's repeatability, and time every map."""
     prepare_torch(threads=threads)
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     networks = {facts["model"]: network for network, facts in map(load_network, inputs["networks"])}

@@ -1,6 +1,6 @@
-"""The learning rate of the printed network of one model, by short trainings of it.
+"""The learning rate of the printed network of one model, by short trainings.
 
-inputs: train, validation;  outputs: rates (CSV, a row for each rate that was tried), rate (JSON)
+inputs: train, validation;  outputs: rates (CSV, a row for each rate), rate (JSON)
 settings: training, network, ssim, seed, threads (by default those of the job)
 """
 
@@ -13,7 +13,7 @@ from softtact.learning.training import best_rate, prepare_torch, try_rates
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Try the rates, write the table of all and the best one."""
+    """Train with each rate; write the table of all and the best one."""
     options = Training.from_dict(settings["training"], where="training")
     network = Network.from_dict(settings["network"] | {"architecture": "printed"}, where="network")
     table = try_rates(read_samples(inputs["train"]), read_samples(inputs["validation"]), network=chosen_network(network, None),

@@ -13,7 +13,7 @@ from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Press the cell as far as it goes, and keep force against compression."""
+    """Press the cell as far as it converges, and write force against compression."""
     spec = SensorSpec.from_dict(settings["sensor"])
     law = law_from_card(load_card(inputs["card_dielectric"]), settings["law"])
     found = frustum_law(spec, law, mesh=mesh_settings(settings["mesh"]))

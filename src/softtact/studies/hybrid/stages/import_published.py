@@ -1,6 +1,6 @@
-"""The published archive as press files and readings, with what was found in it.
+"""Import the published archive as press files and readings, with an inventory.
 
-inputs: files (CSV, for the workflow's sake; `settings.folder` is what is read)
+inputs: files (CSV, only for the workflow; `settings.folder` is read)
 outputs: presses, tactile (folders), item_list (JSON), inventory (JSON), counts, outliers (CSV)
 settings: folder, variant, models, unseen, without, taxel_order, outliers, largest_outlier_share, sensor, seed
 """
@@ -32,11 +32,11 @@ from softtact.sensors.specification import SensorSpec
 if TYPE_CHECKING:
     from softtact.published.table import Outliers
 
-LISTED = 20   # findings in the log; the table has all
+LISTED = 20   # most outliers in the log; the table has all
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Read, pair and check the archive, report outliers, and write what is usable."""
+    """Read, pair and check the archive, report outliers, and write the usable tests."""
     sensor = SensorSpec.from_dict(settings["sensor"])
     check_sensor(sensor)
     tables = read_archive(find_archive(settings["folder"], models=settings["models"], variant=settings["variant"]))
@@ -53,7 +53,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def check_sensor(sensor: SensorSpec) -> None:
-    """Refuse a sensor of another grid: the archive's maps and readings are of the paper's."""
+    """Refuse a sensor with another grid than the paper's, which the archive has."""
     shape = sensor.taxels.rows * sensor.taxels.columns, *sensor.map_shape
     if shape != (TAXELS, MAP_ROWS, MAP_COLUMNS):
         raise InputError(f"sensor {sensor.name}: it has {shape[0]} taxels and maps of {shape[1]} x {shape[2]}; the archive is of "
@@ -61,7 +61,7 @@ def check_sensor(sensor: SensorSpec) -> None:
 
 
 def announce_outliers(outliers: "Outliers") -> None:
-    """Write the outliers to the screen and the log."""
+    """Print the outliers on stderr."""
     for finding in outliers.findings[:LISTED]:
         announce(f"{finding} ({finding.done})")
     if len(outliers.findings) > LISTED:
@@ -70,7 +70,7 @@ def announce_outliers(outliers: "Outliers") -> None:
 
 def inventory(tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]], *, tests: int, sensor: SensorSpec,
               settings: dict[str, Any]) -> dict[str, Any]:
-    """What the archive holds, how it is read, and how that compares with print."""
+    """The contents of the archive, the arrangement of its taxels, and the comparison with the printed counts."""
     found = found_counts(tables, items)
     matches = judge_arrangement(tables, shape=_grid(sensor), seed=settings["seed"])
     best, chosen = max(matches, key=matches.__getitem__), settings["taxel_order"]
@@ -88,7 +88,7 @@ def inventory(tables: Tables, items: dict[tuple[str, str], list[tuple[str, Paire
 
 def write_items(outputs: dict[str, Any], tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]], *,
                 sensor: SensorSpec, settings: dict[str, Any], signs: dict[str, int]) -> None:
-    """A file of maps per item and model, and one of readings per item; what an earlier import left is removed."""
+    """Write maps for each item and model and readings for each item; remove the files of an earlier import."""
     for name in ("presses", "tactile"):
         shutil.rmtree(outputs[name], ignore_errors=True)
         outputs[name].mkdir(parents=True)

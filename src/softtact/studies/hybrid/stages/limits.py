@@ -12,16 +12,16 @@ from softtact.sensors.specification import SensorSpec
 
 
 def find_limits(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """What limits each score, model, data or network: a row per model and set.
+    """Find whether model, data or network limits each score: a row per model and set.
 
     inputs: curves (list of learning_curve.csv), networks (CSV);  outputs: limits
-    settings: own (architecture), tested, reference (names of models), source (of the readings)
+    settings: architecture, tested, reference (names of models), source (of the readings)
     """
     write_csv(outputs["limits"], limits(pd.concat(map(pd.read_csv, inputs["curves"])), pd.read_csv(inputs["networks"]), **settings))
 
 
 def compare_gains(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """How much scores depend on the gain of the virtual sensor's readings: read the presses with each gain, a row for each.
+    """The effect of the virtual sensor's gain on scores: read the presses with each gain, a row for each.
 
     inputs: references (list of presses), presses (list: the same with every tested model)
     outputs: gains (CSV);  settings: sensor, virtual_sensor, ssim, seed

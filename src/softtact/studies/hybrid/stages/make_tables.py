@@ -1,7 +1,7 @@
 """Tables 1 to 3 and the claims.
 
 inputs: cards (list), complexity, ftir, ssim, summary, per_item, ceiling, timing, scores, taxels, searches (best.json of each
-    model), and where objects were pressed features, and repeated and pressed, the same presses done twice (lists)
+    model); if objects were pressed also features, and pressed and repeated (lists of the same presses, made twice)
 outputs: table1, contradictions, table2, table3, claims
 settings: rule, thresholds {total, overlap}, source (of the readings), models (of the searches), sensor (its name)
 """
@@ -48,7 +48,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def _differences(inputs):
-    """{model: largest difference in mm of the maps of a press done twice}; None where nothing was pressed."""
+    """{model: largest difference in mm between the maps of a repeated press}; None without presses."""
     if "repeated" not in inputs:
         return None
     second, first = (list(map(read_dataset, inputs[name])) for name in ("repeated", "pressed"))

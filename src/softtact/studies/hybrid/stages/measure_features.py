@@ -1,4 +1,4 @@
-"""What the deformation maps of the grasped objects show of their features.
+"""Measure the features of the grasped objects in their deformation maps.
 
 inputs: objects (list of meshes), presses (list: every model of every object);  outputs: features (CSV)
 settings: objects [{name, unit, pose}, ...], frustum_height_mm

@@ -1,6 +1,6 @@
 """Mesh of a model's sensor, for ParaView.
 
-outputs: mesh;  settings: sensor, model, kind, mesh (its resolution, where the kind asks for one)
+outputs: mesh;  settings: sensor, model, kind, mesh (its resolution, if the kind has one)
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a fast model's presses start from, once per sensor: the elastic layer's compliance, or the slab's on its frusta.
+"""The compliance for a fast model's presses, once per sensor: of the elastic layer, or of the slab on its frusta.
 
 inputs: for a foundation frustum_law, card_dielectric, card_cover;  outputs: compliance;  settings: sensor, kind, laws {layer: law}
 """
@@ -14,7 +14,7 @@ from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Condense a quarter of the layers four times, and write what is left."""
+    """Condense a quarter of the layers four times, and write the compliance."""
     spec = SensorSpec.from_dict(settings["sensor"])
     compliance: Compliance | FoundationCompliance
     if settings["kind"] == "elastic":

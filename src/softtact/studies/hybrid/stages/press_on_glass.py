@@ -1,4 +1,4 @@
-"""The dielectric pressed on glass: the models' contact area in each orientation and law, and a virtual specimen's with scatter.
+"""The dielectric pressed on glass: contact area of the model for each orientation and law, and of a virtual specimen with scatter.
 
 inputs: card;  outputs: state, virtual
 settings: sensor, forces_n, orientations, laws, constants (printed, fitted), orientation, law, virtual_law, height_scatter,
@@ -20,7 +20,7 @@ from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Solve one cell per orientation and law, then a specimen whose frusta differ in height and tip diameter."""
+    """Solve one cell per orientation and law, then a specimen whose frusta have different heights and tip diameters."""
     spec, card = SensorSpec.from_dict(settings["sensor"]), load_card(inputs["card"])
     changes = {key: value for key, value in settings["mesh"].items() if value is not None}
     forces = np.asarray(settings["forces_n"], dtype=float)

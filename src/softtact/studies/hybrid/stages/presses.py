@@ -22,9 +22,9 @@ COMPLIANCES: dict[str, type[Compliance] | type[FoundationCompliance]] = {"elasti
 
 
 def simulate_press(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Press one item with one model through all forces, and write the maps; a press that does not converge fails with its name.
+    """Press one item with one model at all forces, and write the maps. Raises an error with its name if it does not converge.
 
-    inputs: object (STL), and of mesh, compliance, card_dielectric, card_cover what the model needs
+    inputs: object (STL), and those of mesh, compliance, card_dielectric, card_cover that the model needs
     outputs: press
     settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, friction, device, forces_n
     """
@@ -32,9 +32,9 @@ def simulate_press(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
 
 def simulate_presses(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Press one object in several places with a fast model, and write each press as `simulate_press` would.
+    """Press one object in several places with a fast model, and write each press as `simulate_press` does.
 
-    What is loaded and started serves them all. Nothing is written where one fails, which is named.
+    Files are loaded once for all presses. If one fails, nothing is written, and the error names it.
 
     inputs: object (STL), compliance;  outputs: press, a list
     settings: as for `simulate_press`, with `items`, one for each output, in place of `item`
@@ -49,10 +49,10 @@ def simulate_presses(*, inputs: dict[str, Any], outputs: dict[str, Any], setting
 
 
 def press_section(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Press one object with a large force, and keep the deformed body: for the section and the view that turns.
+    """Press one object with a large force, and write the deformed body for the section and the interactive view.
 
     inputs, settings: as for `simulate_press`, with forces_n [one force]
-    outputs: body (VTU as of `softtact press --vtu`), summary (JSON: what the press says of itself)
+    outputs: body (VTU as of `softtact press --vtu`), summary (JSON: numbers of the press)
     """
     result = press_item(inputs, settings, threads=threads, keep_body=True)
     result.write_vtu(outputs["body"])
@@ -74,10 +74,10 @@ def press_item(inputs: dict[str, Any], settings: dict[str, Any], *, threads: int
 
 
 def make_sensor(inputs: dict[str, Any], settings: dict[str, Any]) -> Sensor:
-    """The `Sensor` that is pressed, with what its model prepared."""
+    """The pressed `Sensor`, with the prepared compliance of its model."""
     kind, mesh, names = settings["kind"], settings["mesh"], names_of(settings)
     spec = SensorSpec.from_dict(settings["sensor"])
-    if kind in COMPLIANCES:     # a press needs no laws then: the compliance knows them
+    if kind in COMPLIANCES:     # the compliance includes the laws
         return Sensor(spec, laws={}, prepared_models={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
     if settings["friction"] is not None:
         spec = SensorSpec.from_dict({**settings["sensor"], "friction": settings["friction"]})
@@ -87,13 +87,13 @@ def make_sensor(inputs: dict[str, Any], settings: dict[str, Any]) -> Sensor:
 
 
 def names_of(settings: dict[str, Any]) -> dict[str, str]:
-    """What a press' file says of itself."""
+    """The attributes of a press' file."""
     item = settings["item"]
     return {"model": settings["model"], "set": item["set"], "item": item["name"]}
 
 
 def press_label(settings: dict[str, Any]) -> str:
-    """A press in words: where its file lies."""
+    """A press in words, by the path of its file."""
     return "{set}/{item}/{model}".format_map(names_of(settings))
 
 
@@ -108,7 +108,7 @@ def _laws(inputs, laws):
 
 
 def press_items(inputs: dict[str, Any], each: Sequence[dict[str, Any]], *, threads: int) -> list[Any]:
-    """A `PressResult`, or the error in its place, of each press; `each` differs from the first by its pose and name alone."""
+    """The `PressResult` or the error of each press; the settings `each` differ only in pose and name."""
     first = each[0]
     mesh = read_mesh(inputs["object"], unit=first["item"]["unit"])
     return make_sensor(inputs, first).press_many(

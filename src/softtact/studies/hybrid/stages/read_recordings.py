@@ -1,4 +1,4 @@
-"""The readings of an item from recordings of a real sensor, a trial each, in place of the virtual sensor's.
+"""The readings of an item from recordings of a real sensor, one trial each, in place of the virtual sensor's.
 
 inputs: recordings, force_logs (lists of CSV);  outputs: tactile
 settings: sensor, set, item, forces_n, fingers and baselines (lists, one for each recording)
@@ -24,7 +24,7 @@ _AXES = ("trial", "force", "row", "column")
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Write the counts at the study's forces while the force rises and, where all recordings have it, while it falls."""
+    """Write the counts at the study's forces while the force rises and, if all recordings have it, while it falls."""
     spec, forces = SensorSpec.from_dict(settings["sensor"]), settings["forces_n"]
     recordings = inputs["recordings"]
     presses = [_read(path, log, forces, finger=finger, baseline=baseline, largest_counts=spec.largest_counts)
@@ -33,7 +33,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     counts = {"tactile_map": [press.loading for press in presses], "unloading_tactile_map": [press.unloading for press in presses]}
     held = [str(path) for path, press in zip(recordings, presses, strict=True) if press.unloading is None]
     if held:
-        announce(f"{settings['set']}/{settings['item']}: no readings on the way down, for {', '.join(held)} "
+        announce(f"{settings['set']}/{settings['item']}: no readings at falling forces, because {', '.join(held)} "
                  f"{'ends' if len(held) == 1 else 'end'} above {forces[0]:g} N.")
         del counts["unloading_tactile_map"]
     data = xarray.Dataset({name: (_AXES, np.array(trials), {"units": "counts"}) for name, trials in counts.items()}
@@ -44,13 +44,13 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def _read(path: "Path", log: "Path", forces: list[float], *, finger: int, baseline: str, largest_counts: float) -> RecordedPress:
-    """One recording at the forces; what no sensor read is refused."""
+    """One recording at the forces. Raises InputError for a simulated recording."""
     recording = read_recording(path, baseline=baseline)
     if recording.attrs["source"] != RECORDER:
-        raise InputError(f"{path}: it is of the {recording.attrs['source']}, which no sensor read; give a file of the TSF-85's "
+        raise InputError(f"{path}: its source is the {recording.attrs['source']}, not a real sensor; give a file of the TSF-85's "
                          "recorder.")
     still = [str(row * COLUMNS + column) for row, column in np.argwhere(dead(recording)[finger])]
     if still:
-        announce(f"{path}: taxel {', '.join(still)} of finger {finger} never changes while others do; it may be dead, and is taken "
-                 "as it reads.")
+        announce(f"{path}: taxel {', '.join(still)} of finger {finger} never changes while others do; it may be dead, and is used "
+                 "as recorded.")
     return readings_at(with_force(recording, log), forces, finger=finger, largest_counts=largest_counts)

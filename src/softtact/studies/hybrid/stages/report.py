@@ -1,4 +1,4 @@
-"""The report page, and beside it the configuration and the code that it was made with.
+"""Write the report page, and the configuration and code that it was made with.
 
 inputs: table1, contradictions, table2, table3, networks, scores, levels, verdicts, claims, summary, ftir, figures (list of PNG and
     HTML), sources (list of source files), and policies and gains, or inventory and counts of the published archive
@@ -17,7 +17,7 @@ from softtact.studies.hybrid.page import missing, render_page, render_sources
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Write the configuration, the sources, the record of the run, what it lacks, and the page, each whole."""
+    """Write the configuration, the sources, the record of the run, the differences from the paper, and the page."""
     config, named = (yaml.safe_dump(settings[name], sort_keys=False, allow_unicode=True, width=120) for name in ("config", "named"))
     record = run_record(settings["benchmarks"])
     write_csv(outputs["run"], record)

@@ -1,4 +1,4 @@
-"""Series of trainings of one model's networks: on growing numbers of maps, and from several seeds; the spread over the seeds."""
+"""Series of trainings of one model's networks: on increasing numbers of maps, and from several seeds with their spread."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -25,7 +25,7 @@ from softtact.learning.training import prepare_torch
 def learning_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """SSIM against the number of training maps: train every network at every share; a row per network, share and set.
 
-    inputs: train, validation, unseen, grasps, and best (of the search) and rate (of its trial) where a network needs them
+    inputs: train, validation, unseen, grasps, and best (of the search) and rate (of its trial) if a network needs them
     outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed, threads
     """
     curve = LearningCurve.from_dict(settings["learning_curve"], where="learning_curve")
@@ -63,7 +63,7 @@ def gather_seeds(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 
 def _of_networks(train: Callable[[Experiment], pd.DataFrame], networks: Sequence[str], inputs: dict[str, Any],
                  settings: dict[str, Any], threads: int) -> pd.DataFrame:
-    """The tables of one series of trainings with each of the networks, one below the other."""
+    """The tables of one series of trainings of each network, concatenated."""
     options = Training.from_dict(settings["training"], where="training")
     best, trial = (read_json(inputs[name]) if name in inputs else None for name in ("best", "rate"))
     samples, tests = read_samples(inputs["train"]), {name: read_samples(inputs[name]) for name in TESTS}

@@ -1,8 +1,8 @@
-"""Scores of the predictors without a network, with which every score is compared.
+"""Score the predictors without a network, the baselines of every score.
 
 inputs: train, validation, unseen, grasps (one per model each)
-outputs: baselines (CSV, a row for each sample and predictor), taxels (CSV, how far each taxel is excited by the indenters)
-settings: sensor, counts_per_relative_change (of the readings; null where it is not known), ssim
+outputs: baselines (CSV, a row for each sample and predictor), taxels (CSV, largest counts of each taxel over the indenters)
+settings: sensor, counts_per_relative_change (of the readings; null if unknown), ssim
 """
 
 from typing import Any

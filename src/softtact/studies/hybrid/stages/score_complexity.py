@@ -1,4 +1,4 @@
-"""STL files of objects -> table of complexity counts and the model that each asks for."""
+"""Tabulate the complexity of objects (STL files) and the model chosen for each."""
 
 from typing import Any
 

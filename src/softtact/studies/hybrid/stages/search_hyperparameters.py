@@ -1,6 +1,6 @@
 """Hyperparameter search for one model's network.
 
-inputs: train, validation;  outputs: search (CSV), best (JSON); the trials' journal lies beside them
+inputs: train, validation;  outputs: search (CSV), best (JSON), and the journal of the trials beside them
 settings: search, network, ssim, device, seed
 """
 
@@ -14,7 +14,7 @@ from softtact.learning.training import prepare_torch
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Run the trials that are left, write the table of all and the best one."""
+    """Run the remaining trials; write the table of all and the best one."""
     options = Search.from_dict(settings["search"], where="search")
     network = Network.from_dict(settings.get("network", {}), where="network")
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim")

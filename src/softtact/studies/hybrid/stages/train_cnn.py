@@ -1,8 +1,8 @@
-"""A network of one model, trained.
+"""Train a network of one model.
 
-inputs: train, validation, best (of the search), and rate where the printed network's is found by a trial
-outputs: model (the best epoch's weights), history, and timing where asked for; a checkpoint lies beside them meanwhile
-settings: training, network (its `architecture` names the trained one), ssim, seed, threads (by default those of the job)
+inputs: train, validation, best (of the search), and rate if that of the printed network is found by a trial
+outputs: model (weights of the best epoch), history, timing (optional); during the training a checkpoint lies beside them
+settings: training, network (with its `architecture`), ssim, seed, threads (by default those of the job)
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ HISTORY = ["epoch", "train_loss", "validation_loss", "validation_ssim", "learnin
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Train, or go on with a training that was cut off, and write the best weights and the history."""
+    """Train, or continue an interrupted training, and write the best weights and the history."""
     network = Network.from_dict(settings["network"], where="network")
     best, seed = read_json(inputs["best"]), settings["seed"]
     trial = read_json(inputs["rate"]) if "rate" in inputs else None
@@ -41,7 +41,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def write_results(outputs: dict[str, Any], training: Run, *, facts: dict[str, Any]) -> None:
-    """Write the best weights and the history; wall times, which no two runs share, go to a separate file."""
+    """Write the best weights and the history; wall times, which differ between runs, go to a separate file."""
     best = training.best
     training.network.load_state_dict(best["weights"])
     save_network(outputs["model"], training.network,

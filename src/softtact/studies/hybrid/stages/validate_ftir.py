@@ -1,7 +1,7 @@
-"""Contact area per frustum against force: the model's, the image's, and the measured one; and which orientations the paper allows.
+"""Contact area per frustum against force of model, image and measurement, and the orientations compatible with the paper.
 
-inputs: state, virtual, discs (list), measured (CSV force_n, area_mm2 of the mean frustum; without it the virtual dielectric
-    stands in)
+inputs: state, virtual, discs (list), measured (CSV force_n, area_mm2 of the mean frustum; by default the virtual dielectric is
+    used)
 outputs: area (CSV), orientations (CSV, long: each orientation and law), summary (JSON);  settings: pixel_mm of the camera
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Join the three curves, report their differences, and judge the orientations by the paper's words."""
+    """Join the three curves, compute their differences, and judge the orientations by the paper's statements."""
     state, virtual = read_dataset(inputs["state"]), read_dataset(inputs["virtual"])
     count = virtual.sizes["frustum"]
     orientations = long_table(state, count)
@@ -34,7 +34,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def long_table(state: "xarray.Dataset", count: int) -> pd.DataFrame:
-    """Every orientation's and law's curve, one row a force."""
+    """The curve of every orientation and law, one row per force."""
     names = ["area_per_frustum_mm2", "compression_mm", "disc_gap_mm"]
     table = state[[*names, "force_n"]].to_dataframe().reset_index()
     table["area_total_mm2"] = count * table.area_per_frustum_mm2
@@ -42,7 +42,7 @@ def long_table(state: "xarray.Dataset", count: int) -> pd.DataFrame:
 
 
 def _curves(inputs, state, virtual, count):
-    """Table of the model under test, the image and the measurement; discs found by force; where the measurement is from."""
+    """Table of the model under test, the image and the measurement; discs by force; source of the measurement."""
     forces = state.force_n.values
     model = state.area_per_frustum_mm2.sel(orientation=state.attrs["orientation_under_test"],
                                            law=state.attrs["law_under_test"]).values
@@ -63,7 +63,7 @@ def _errors(table, virtual, count):
 
 
 def _measured(path, forces, virtual):
-    """The measured area at the forces, and what it comes from."""
+    """The measured area at the forces, and its source."""
     if path is None:
         return virtual.area_per_frustum_mm2.values, "virtual dielectric (no measured curve was given)"
     force_n, area_mm2 = _measured_curve(path)

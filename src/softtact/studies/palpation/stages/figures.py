@@ -1,4 +1,4 @@
-"""Figures of a palpation sensor: mesh and deformed shape, the curves as the paper draws them, hardness, hidden lumps.
+"""Figures of a palpation sensor: mesh and deformed shape, the paper's curves, hardness, hidden lumps.
 
 Inputs `sweeps` are a list of NetCDF; outputs of each are png and svg.
 """
@@ -27,7 +27,7 @@ def _words(name: str) -> str:
 
 
 def _plane_triangles(mesh: SolidMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (t, 3) of all elements (of a solid: of the section z = 0), and the four corners (e, 4) of each element."""
+    """Triangles (t, 3) of all elements (of a solid: in the section z = 0), and the four corners (e, 4) of each element."""
     triangles, corners = [], []
     for _, element, nodes in mesh.parts():
         local = element.nodes
@@ -42,7 +42,7 @@ def _plane_triangles(mesh: SolidMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def draw_shapes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Figure 2: the mesh at rest, and deformed by the jaw's last displacement, with the vertical displacement.
+    """Figure 2: the mesh at rest, and deformed at the last displacement of the jaw, coloured by the vertical displacement.
 
     inputs: sweeps of the displacement;  settings: design
     """
@@ -86,7 +86,7 @@ def _shade_regions(ax, mesh):
 
 
 def draw_curves(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Figures 3 and 4: deflection under rising load, and force against deflection under a moved jaw with the trend lines.
+    """Figures 3 and 4: deflection under rising load, and force against deflection for a displaced jaw, with trend lines.
 
     inputs: sweeps, slopes (CSV)
     """
@@ -150,7 +150,7 @@ def draw_hardness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 
 def draw_lump(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Where a lump is seen, and how well hidden lumps were found, with their 95 % intervals.  inputs: detection, recovery (CSV)."""
+    """Where a lump is detected, and estimates of hidden lumps with 95 % intervals.  inputs: detection, recovery (CSV)."""
     plt, detection, recovered = pyplot(), pd.read_csv(inputs["detection"]), pd.read_csv(inputs["recovery"])
     figure, (left, *others) = plt.subplots(1, 4, figsize=(13, 3.2), layout="constrained", width_ratios=(1.6, 1, 1, 1))
     grid = detection.pivot(index="depth_mm", columns="x_mm", values="least_stiffness_ratio")

@@ -1,4 +1,4 @@
-"""The search for a hidden lump: a table of film forces, where a lump is seen, how well hidden ones are found.
+"""The search for a hidden lump: a table of film forces, where a lump is detected, and the errors of its estimates.
 
 Setting `design`: the values of a `PalpationDesign` with its `search`.
 """
@@ -20,7 +20,7 @@ _AXES = ("x_mm", "depth_mm", "stiffness_ratio")
 def solve_lumps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Solve all lumps of a search.  outputs: lumps (NetCDF);  settings: design."""
     design, search, watch = *_design(settings), Watch("lumps")
-    table = lump_table(design, search, threads=threads, tell=watch.beat)
+    table = lump_table(design, search, threads=threads, report=watch.report)
     watch.end()
     data = xarray.Dataset({"force_n": ((*_AXES, "film"), table.force_n, {"units": "N"}),
                            "unladen_n": ("film", table.unladen_n, {"units": "N"})},
@@ -37,7 +37,7 @@ def find_lumps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
     data = read_dataset(inputs["lumps"])
     table = LumpTable(data.x_mm.values, data.depth_mm.values, data.stiffness_ratio.values, data.force_n.values,
                       data.unladen_n.values, search.noise_n, np.array(search.moves))
-    seen, found = detection_map(table), recovery(design, search, table, threads=threads, tell=watch.beat)
+    seen, found = detection_map(table), recovery(design, search, table, threads=threads, report=watch.report)
     watch.end()
     write_csv(outputs["detection"], seen)
     write_csv(outputs["recovery"], found)
@@ -51,10 +51,10 @@ def _design(settings: dict[str, Any]) -> tuple[PalpationDesign, LumpSearch]:
 
 
 def _facts(seen: pd.DataFrame, found: pd.DataFrame) -> dict[str, Any]:
-    """How well lumps are found: errors of all presses, of the first alone, and of one guess for every lump."""
+    """Errors of the estimates of lumps: with all presses, with the first press only, and with the same guess for every lump."""
     error, alone = ({name: float((found[f"{how}_{name}"] - found[name]).abs().median()) for name in _AXES}
                     for how in ("found", "alone"))
-    guess = {name: float((found[name] - found[name].median()).abs().median()) for name in _AXES}     # the best constant
+    guess = {name: float((found[name] - found[name].median()).abs().median()) for name in _AXES}     # the best constant estimate
     return {"median_error": error, "median_error_in_one_press": alone, "median_error_of_one_guess": guess,
             "within_interval": {name: float(found[f"{name}_within"].mean()) for name in PARAMETERS},
             "least_ratio_seen": [float(seen.least_stiffness_ratio.min()), float(seen.least_stiffness_ratio.max())],

@@ -1,4 +1,4 @@
-"""The page of a palpation sensor, and all facts of its study in one file."""
+"""The report of a palpation sensor, and all facts of its study in one file."""
 
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,7 @@ def _conditions(design: PalpationDesign, facts: dict[str, Any]) -> str:
 
 
 def _assumptions(design: PalpationDesign) -> list[str]:
-    """What a design marks as assumed, a sentence each."""
+    """The assumptions of a design, one sentence each."""
     materials = {"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues
     marked = [f"{name}: {material.source}" for name, material in materials.items() if material.assumed]
     marked += [f"film {name}: {film.source}" for name, film in design.films.items() if film.assumed]
@@ -66,7 +66,7 @@ def _assumptions(design: PalpationDesign) -> list[str]:
 
 
 def _on_hardness(verdicts):
-    for column in sorted(verdicts, reverse=True):     # the paper's measure first
+    for column in sorted(verdicts, reverse=True):     # puts the paper's measure first
         found = verdicts[column]
         yield (f"{column}: changes with load by up to {found['change_with_load']:.1%}, with the tissue's height by up to "
                f"{found['change_with_height']:.1%}; hardest over softest tissue {found['contrast']:.2f} or more; tissues "

@@ -1,4 +1,4 @@
-"""Sweeps of the jaw, and the tables that are made of them.
+"""Sweeps of the jaw, and their tables.
 
 Setting `design`: the values of a `PalpationDesign` that the stage uses.
 """
@@ -27,8 +27,8 @@ def sweep(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
     """
     design = PalpationDesign.model_validate(settings["design"])
     (tissue,) = design.tissues
-    with _watch(f"{tissue}, {settings['scenario']}") as tell:
-        found = palpate(design, tissue, settings["scenario"], values=np.array(settings["steps"]), threads=threads, tell=tell)
+    with _watch(f"{tissue}, {settings['scenario']}") as report:
+        found = palpate(design, tissue, settings["scenario"], values=np.array(settings["steps"]), threads=threads, report=report)
     write_dataset(outputs["sweep"], found.dataset(), seed=None, settings=settings)
 
 
@@ -36,8 +36,8 @@ def measure_hardness(*, inputs: dict[str, Any], outputs: dict[str, Any], setting
     """Measure the hardness of one tissue of one height over load.  outputs: rows (CSV);  settings: design with `hardness`."""
     design = PalpationDesign.model_validate(settings["design"])
     assert design.hardness is not None
-    with _watch("hardness") as tell:
-        table = hardness_table(design, design.hardness, threads=threads, tell=tell)
+    with _watch("hardness") as report:
+        table = hardness_table(design, design.hardness, threads=threads, report=report)
     write_csv(outputs["rows"], table, float_format="%.17g")
 
 
@@ -104,9 +104,9 @@ def _slope_row(found: Palpation) -> dict[str, Any]:
 
 @contextmanager
 def _watch(label):
-    """A function that reports progress while a block runs."""
+    """A function that reports progress, with a final line end after the block."""
     watch = Watch(label)
     try:
-        yield watch.beat
+        yield watch.report
     finally:
         watch.end()

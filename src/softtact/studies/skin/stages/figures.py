@@ -1,6 +1,6 @@
-"""The figures of a skin: displacement and taxels as in the papers, probes, the front, thickness, maps, modules on a link.
+"""The figures of a skin: displacement and taxels as in the papers, probes, Pareto front, thickness, maps, modules on a link.
 
-Outputs of each are png and svg, of the link png alone.
+Outputs of each are png and svg; for the link only png.
 """
 
 from typing import Any
@@ -13,11 +13,11 @@ from softtact.reporting.style import pyplot, save
 from softtact.studies.skin.settings import design_of
 
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)     # of counts, on a logarithmic scale
-_EXCITED = "autumn_r"  # yellow to red, as the papers colour taxels
+_EXCITED = "autumn_r"  # yellow to red, as in the papers
 
 
 def draw_load(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Left the displacement of the upper side in mm, right each taxel by the counts that it rises.
+    """Left: displacement of the upper side in mm. Right: taxels coloured by the rise of their counts.
 
     inputs: readings (NetCDF), table (CSV);  settings: module, patch, load (its number), elastomer
     """
@@ -40,7 +40,7 @@ def draw_load(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
 
 
 def draw_probes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Rise of the pressed taxel against pressure: a panel for each probe, a line for each error of the modulus.
+    """Rise of the pressed taxel's capacitance against pressure: a panel for each probe, a line for each error of the modulus.
 
     inputs: table (CSV). Dotted: the elastomer's curve is extrapolated.
     """
@@ -64,7 +64,7 @@ def draw_probes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
 
 def draw_front(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Left sensitivity against weight with the front in red squares, right how often each elastomer is on the front.
+    """Left: sensitivity against weight, with the Pareto front as red squares. Right: share of draws with an elastomer on the front.
 
     inputs: choice_printed, front_confidence (CSV)
     """
@@ -209,6 +209,6 @@ def _frame(axes, layout):
 
 
 def _size(places):
-    """Area of a mark in points, for marks that touch."""
+    """Area of a mark in points such that neighbouring marks touch."""
     spacing = float(np.min(np.diff(np.unique(np.round(places[:, 0], 6))), initial=np.inf)) if len(places) > 1 else 1.0
     return 0.9 * (230 / np.ptp(places, axis=0).max() * spacing) ** 2

@@ -1,4 +1,4 @@
-"""Which elastomer, how thick, with which taxels: the choice by needs, and the search over all designs."""
+"""The choice of elastomer, thickness and taxels by requirements, and the search over all designs."""
 
 from itertools import product
 from typing import Any
@@ -23,11 +23,11 @@ from softtact.studies.skin.settings import converter_of, design_of, elastomers_o
 
 
 def choose_layer(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Choose by the papers' criteria, and the thinnest layer that meets all needs.
+    """Evaluate the papers' criteria, and choose the thinnest layer that meets all requirements.
 
     outputs: choice_printed, front_confidence, thickness, choice (CSV), facts (JSON)
-    settings: module, choice, elastomers, converter, known and bearable (names of elastomers whose curves reach the target pressure,
-    the range of pressures)
+    settings: module, choice, elastomers, converter, known, bearable (names of elastomers whose curves reach the target pressure,
+    and the whole range of pressures)
     """
     choice, layout = Choice.model_validate(settings["choice"]), design_of(settings).module.layout()
     elastomers = elastomers_of(settings)
@@ -51,7 +51,7 @@ def choose_layer(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 
 
 def search_cell(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """All elastomers and pitches at one thickness and radius.
+    """Evaluate all elastomers and pitches at one thickness and radius.
 
     outputs: rows (JSON)
     settings: elastomers, thickness_mm, radius_mm, pitches_mm, gap_mm, side_mm, needs, converter
@@ -67,7 +67,7 @@ def rank_designs(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
     """Rank all designs of a search.
 
     inputs: rows (list of JSON);  outputs: search, main_effects (CSV)
-    settings: weight_budget_g, elastomers (names), thicknesses_mm, radii_mm, pitches_mm, the order of designs that rank alike
+    settings: weight_budget_g, elastomers (names), thicknesses_mm, radii_mm, pitches_mm, whose order decides between equal designs
     """
     rows = {(row["elastomer"], row["thickness_mm"], row["radius_mm"], row["pitch_mm"]): row
             for path in inputs["rows"] for row in read_json(path)}
@@ -78,7 +78,7 @@ def rank_designs(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 
 
 def _lightest(choice: pd.DataFrame) -> dict[str, Any] | None:
-    """The first row of a choice, which is the lightest, in words and numbers; None where nothing meets all needs."""
+    """The first row of a choice, which is the lightest, as a record; None if no layer meets all requirements."""
     if not len(choice):
         return None
     best = choice.iloc[0]

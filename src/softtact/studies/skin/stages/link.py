@@ -1,4 +1,4 @@
-"""A skin's taxels in space: modules laid on a robot's link, and files for other programs."""
+"""A skin's taxels in space: modules placed on a robot's link, and files for other programs."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from softtact.studies.skin.settings import design_of
 
 
 def lay_modules(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Lay modules on a link.
+    """Place modules on a link.
 
     inputs: mesh;  outputs: modules, seams (CSV), laid (NetCDF), facts (JSON);  settings: module, link, density_g_cm3
     """
@@ -40,7 +40,7 @@ def lay_modules(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 def write_exports(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the taxels for other programs.
 
-    inputs: laid (NetCDF), where modules lie on a link;  outputs: txt, urdf, xml, of one name in one folder
+    inputs: laid (NetCDF), if modules are placed on a link;  outputs: txt, urdf, xml with the same name in one folder
     settings: module, patch
     """
     layout = design_of(settings).layout()

@@ -1,6 +1,6 @@
-"""What a skin does under loads: deformation, capacitances, counts; what a finger makes it read anywhere.
+"""A skin under loads: deformation, capacitances, counts; and its readings for a finger at any place.
 
-All have the settings of a skin: module, patch, mesh, elastomer.
+All stages have the settings of a skin: module, patch, mesh, elastomer.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ def press_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 def read_taxels(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Read all taxels under each load.
 
-    inputs: files (list: meshes and masks of loads at small strains), pressed (list: loads at finite strains), in the loads' order
+    inputs: files (list: meshes and masks of loads at small strains), pressed (list: loads at finite strains), by load
     outputs: readings (NetCDF), table (CSV), facts (JSON);  settings: of the skin, and loads, converter
     """
     skin, elastomer, converter = skin_of(settings, threads), elastomer_of(settings), converter_of(settings)
@@ -65,7 +65,7 @@ def compute_probes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
 
 def map_patch(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Map what a finger makes the skin read, and crosstalk against pitch.
+    """Map the readings for a finger, and compute crosstalk against pitch.
 
     outputs: detection, crosstalk (CSV), facts (JSON)
     settings: of the skin, and maps, converter, needs {detected_counts, smallest_force_n}
@@ -87,7 +87,7 @@ def map_patch(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
 
 
 def _pressed_by(choice):
-    """How an object presses, whatever the strains."""
+    """Force and place of an object, for small and finite strains alike."""
     return {"force_n": choice.force_n, "turned_deg": choice.turned_deg, "name": choice.name}
 
 
@@ -103,14 +103,14 @@ def _load(choice, skin, elastomer, file):
 
 
 def _kept_load(path):
-    """What `press_object` wrote."""
+    """Read a load of `press_object`."""
     data = read_dataset(path)
     return Load(data.point_mm.values, data.force_n.values, data.attrs["pressure_mpa"], data.attrs["words"],
                 data.displacement_mm.values)
 
 
 def _load_table(loads: Mapping[str, Load], readings: Readings, converter: Converter) -> pd.DataFrame:
-    """A row for each load: what it is, and what the skin does."""
+    """A row for each load: its description, deformation and counts."""
     rows = []
     for number, (name, load) in enumerate(loads.items()):
         delta, counts = readings.delta_ff[number], readings.counts[number]
@@ -122,7 +122,7 @@ def _load_table(loads: Mapping[str, Load], readings: Readings, converter: Conver
 
 
 def _dataset(skin: Skin, loads: Mapping[str, Load], readings: Readings, elastomer: Elastomer) -> xarray.Dataset:
-    """All readings, labelled."""
+    """All readings as a labelled data set."""
     top = skin.layer.mesh.nodes_mm[skin.layer.mesh.top, :2]
     per_taxel = {"capacitance_ff": ("fF", "of the deformed skin"), "delta_ff": ("fF", "above rest"), "counts": ("1", "above rest")}
     values: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The results of all jobs of a skin's study: the papers' claims, and the report."""
+"""The papers' claims, and the report of all results of a skin's study."""
 
 from pathlib import Path
 from typing import Any
@@ -73,7 +73,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
 
 
 def _all_facts(paths: list[Path]) -> dict[str, Any]:
-    """The facts of all sections; remarks one after the other."""
+    """The facts of all sections; their remarks are joined."""
     parts = [read_json(path) for path in paths]
     facts = {name: value for part in parts for name, value in part.items()}
     return facts | {"remarks": [remark for part in parts for remark in part.get("remarks", [])]}
@@ -88,7 +88,7 @@ def _caption(path, loads):
 
 
 def _facts(design: SkinDesign) -> str:
-    """What the skin is, and how it is computed."""
+    """The skin and its model in sentences."""
     module = design.module
     patch = "Six modules around a corner, under one piece of elastomer" if design.patch == "hexagon" else "One module"
     return (f"{patch}: side {module.side_mm:g} mm, taxels of radius {module.radius_mm:g} mm at a pitch of {module.pitch_mm:g} mm, "
@@ -98,7 +98,7 @@ def _facts(design: SkinDesign) -> str:
 
 
 def _result(design, facts):
-    """The answers in sentences."""
+    """The results in sentences."""
     return " ".join(sentence for sentence in (_chosen(design, facts), _mapped(facts), _laid(facts)) if sentence)
 
 
