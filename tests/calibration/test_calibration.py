@@ -158,7 +158,7 @@ def test_a_modulus_that_runs_to_the_end_of_its_range_is_not_believed(bench, expe
     problem = Problem(bench.presses, experiments[:1], ("modulus",))
     best = problem.linear(np.concatenate(problem.changes(problem.mean)))
     at_end = CalibrationResult(problem, problem.bounds[1].copy(), best, [], np.eye(1), [], 1.0, [])
-    with pytest.raises(InputError, match="fitted moduli are 2.00 times those of the materials, a bound of the fit; check that the forces"):
+    with pytest.raises(InputError, match="fitted moduli are 2.00 times those of the materials, a bound of the fit; check"):
         check_result(at_end)
     check_result(replace(at_end, vector=problem.mean))
 

@@ -229,7 +229,8 @@ def test_a_frames_depth_and_channels_do_not_matter():
 
 
 def test_an_array_that_is_no_picture_is_refused():
-    for picture, said in ((np.zeros(9), r"shape \(9,\) is not a picture"), (np.zeros((3, 100)), r"shape \(3, 100\) is not a picture"),
+    for picture, said in ((np.zeros(9), r"shape \(9,\) is not a picture"),
+                          (np.zeros((3, 100)), r"shape \(3, 100\) is not a picture"),
                           (np.full((50, 50), np.nan), r"2500 values that are not finite numbers, the first at .* \(0, 0\)"),
                           (np.zeros((50, 50, 5)), "5 channels"), (np.zeros((50, 50), dtype=complex), "complex128")):
         with pytest.raises(InputError, match=said):
