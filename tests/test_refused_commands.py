@@ -199,7 +199,7 @@ def test_each_yaml_of_the_project_refuses_a_key_that_stands_twice(folder, capsys
 def test_an_object_that_stands_twice_in_the_catalogue_is_refused(tmp_path):
     line = "- {name: a, file: a.stl, unit: mm, set: grasps, label: A}\n"
     (tmp_path / "catalogue.yaml").write_text(2 * line)
-    with pytest.raises(InputError, match="the object 'a' stands in it twice"):
+    with pytest.raises(InputError, match="the object 'a' is listed twice"):
         read_catalogue(tmp_path / "catalogue.yaml")
 
 

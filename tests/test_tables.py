@@ -124,7 +124,7 @@ def as_percent(book):
 
 
 @pytest.mark.parametrize(("sheets", "options", "sentence"), [
-    ({"a": ROWS, "b": ROWS}, {}, "several sheets hold something, a, b; name the one to read"),
+    ({"a": ROWS, "b": ROWS}, {}, "several sheets hold data, a, b; name the one to read"),
     ({"a": ROWS}, {"sheet": "c"}, "there is no sheet 'c'; name one of a"),
     ({"a": []}, {}, "all sheets are empty"),
     ({"a": ROWS}, {"change": as_percent}, "cell A3: it is shown as percent"),

@@ -104,7 +104,7 @@ def test_a_video_that_was_cut_off_is_refused_and_not_read_up_to_there(name, code
 @pytest.mark.parametrize(("values", "how", "said"), [
     pytest.param(np.dstack([TINY[0]] * 5), {"photometric": "minisblack", "planarconfig": "contig"}, "no stated meaning",
                  id="bands"),
-    pytest.param(np.dstack([TINY[0]] * 3), {"photometric": "ycbcr"}, "its values mean YCBCR", id="YCbCr"),
+    pytest.param(np.dstack([TINY[0]] * 3), {"photometric": "ycbcr"}, "its photometric interpretation YCBCR", id="YCbCr"),
     pytest.param(np.tile(TINY[:, :16, :16], (4, 1, 1))[:16], {"volumetric": True, "tile": (16, 16, 16)},
                  "in an unknown layout", id="volume"),
 ])

@@ -35,6 +35,6 @@ def test_each_architecture_takes_the_rate_that_was_found_for_it(architecture, ra
 
 def test_the_printed_network_does_not_fall_back_to_the_rate_of_the_search():
     network = Network(architecture="printed")
-    with pytest.raises(InputError, match="training.learning_rate is 'found', and for the printed network nothing has been found"):
+    with pytest.raises(InputError, match="training.learning_rate is 'found', but no rate of the printed network is given"):
         chosen_training(Training(), network, found_for(network, search=SEARCH, trial=None))
     assert chosen_training(Training(learning_rate=0.01), network, None).learning_rate == 0.01

@@ -115,7 +115,7 @@ def test_a_comma_that_may_be_one_of_thousands_is_refused(small, folder):
     rows = ["force;" + ";".join(f"tax{k}" for k in range(1, 29)) + ";Path"]
     rows += [";".join(["5"] + ["1,234"] * 28 + [path]) for path in small.real["Flat"].Path]
     (folder / REAL).write_text("\n".join(rows) + "\n")
-    with pytest.raises(InputError, match="row 2: whether the comma of '1,234' is a decimal one or of thousands"):
+    with pytest.raises(InputError, match="row 2: the comma of '1,234' may be a decimal sign or a thousands separator"):
         read(folder)
 
 

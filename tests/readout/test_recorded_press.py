@@ -144,6 +144,6 @@ def test_what_a_network_gave_is_refused_as_a_recording(files, tmp_path):
     _, log = files("x", ramp())
     path = tmp_path / "extension.csv"
     path.write_text("time_sec,frame," + ",".join(f"pred_{k}" for k in range(28)) + "\n0,0" + ",1" * 28 + "\n")
-    with pytest.raises(InputError, match="a network's reading, which no sensor read; give a file of the TSF-85's recorder"):
+    with pytest.raises(InputError, match="a network's reading, not a real sensor; give a file of the TSF-85's recorder"):
         run([(path, log)], tmp_path / "key.nc")
     assert not (tmp_path / "key.nc").exists()

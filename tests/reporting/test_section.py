@@ -48,7 +48,7 @@ def test_the_layers_of_a_section_at_rest_have_their_areas(body):
 
 def test_cells_that_cannot_be_cut_are_refused_and_not_left_out(body):
     kind, nodes, layer = body.cells[0]
-    with pytest.raises(InputError, match="Cells of the kind 'tetra10' are not cut"):
+    with pytest.raises(InputError, match="Cells of the kind 'tetra10' cannot be cut"):
         section(replace(body, cells=[*body.cells[1:], ("tetra10", nodes[:, :10], layer)]), 0.0)
 
 

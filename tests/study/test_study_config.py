@@ -89,7 +89,7 @@ def test_a_mistake_is_named_with_its_remedy():
         ("data", {"source": "published"}, "'unseen' is empty; name indenters of the archive to leave out of the training"),
         ("data", {"source": "published", "unseen": ["a"], "folder": "no/such"}, "no/such: there is no such folder; put the"),
         ("models.hyperelastic.mesh.refinement", -1, "at 'models.hyperelastic.mesh.refinement' (it is -1)"),
-        ("models.elastic.friction", {"object": 0.3}, "at 'models.elastic': a model of kind 'elastic' knows no friction"),
+        ("models.elastic.friction", {"object": 0.3}, "at 'models.elastic': a model of kind 'elastic' has no friction"),
         ("models.elastic.device", "cuda", "at 'models.elastic': a model of kind 'elastic' has no 'device'; leave it out"),
         ("models.reference.friction", {"board": 0.3}, "bonded tips cannot slide with a friction of 0.3 on the board"),
         ("virtual_sensor", {"noise_counts": -1}, "virtual_sensor: noise_counts is -1.0; give one number of 0 or more."),

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 # Dark blue, light orange and a green between them, which are distinct in grey, too.
 MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
-MODEL_NAMES = {name: name for name in MODEL_COLOURS}
 ARCHITECTURE_LINES = {"printed": "-", "searched": "-.", "compact": "--"}
 
 
