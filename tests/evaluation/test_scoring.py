@@ -12,7 +12,6 @@ from softtact.evaluation.scoring import (
     score_samples,
     score_sensor,
     summarise_scores,
-    summarise_times,
     time_presses,
 )
 from softtact.learning.dataset import Samples
@@ -143,12 +142,6 @@ def test_times_hold_the_solvers_from_the_press_and_the_networks_as_measured(pres
     assert timing.columns.tolist() == ["model", "item", "set", "force_n", "solver_s", "network_s"]
     assert timing.solver_s.tolist() == [3.0, 1.0] and (timing.network_s >= 0).all()
     assert set(shapes) == {(1, 57, 33)} and len(shapes) == 1 + 2 * 2
-
-
-def test_the_times_summary_adds_solver_and_network():
-    timing = pd.DataFrame({"model": "elastic", "solver_s": [1.0, 3.0], "network_s": [0.5, 0.5]})
-    row = summarise_times(timing).iloc[0]
-    assert (row.maps, row["mean"], row["min"], row["max"]) == (2, 2.5, 1.5, 3.5) and row.sd == pytest.approx(2**0.5)
 
 
 def test_one_trial_at_the_same_force_twice_is_no_repetition():

@@ -201,10 +201,3 @@ def seconds(call: Callable[..., object], *arguments: object) -> float:
     start = time.perf_counter()
     call(*arguments)
     return time.perf_counter() - start
-
-
-def summarise_times(timing: pd.DataFrame) -> pd.DataFrame:
-    """Time per map of solver and network together in s: model, maps, mean, min, max, sd."""
-    total = timing.assign(total_s=timing.solver_s + timing.network_s)
-    return total.groupby("model", sort=False).total_s.agg(
-        maps="size", mean="mean", min="min", max="max", sd="std").reset_index()
