@@ -8,10 +8,11 @@ from softtact.evaluation.claim_rows import within
 from softtact.skin.elastomers import read_elastomers
 from softtact.skin.layout import module_layout
 from softtact.studies.grasps.claims import claims_of_grasps
-from softtact.studies.hybrid.claims import of_models
-from softtact.studies.hybrid.claims.of_models import claims_of_times
-from softtact.studies.hybrid.claims.of_readings import claims_of_scores, claims_of_study
+from softtact.studies.hybrid.claims import of_readings
+from softtact.studies.hybrid.claims.of_readings import claims_of_scores
+from softtact.studies.hybrid.claims.of_study import claims_of_study
 from softtact.studies.hybrid.claims.of_tests import claims_of_materials
+from softtact.studies.hybrid.claims.of_times import claims_of_times
 from softtact.studies.hybrid.tables import PRINTED_TIMES
 from softtact.studies.palpation.claims import claims_of_probe
 from softtact.studies.skin import claims as claims_of_skin
@@ -31,11 +32,13 @@ def test_a_number_is_the_printed_one_up_to_the_factor_itself_on_both_sides():
 def test_times_are_solver_and_network_together_with_errors_of_both_models():
     """Means 3 and 20 s with standard errors 1 and 10: the ratio 6.67 has 6.67 (1/9 + 1/4)^(1/2) = 4.0."""
     timing = pd.DataFrame({"model": ["elastic"] * 2 + ["hyperelastic"] * 2, "solver_s": [1.0, 3.0, 9.5, 29.5],
-                           "network_s": [1.0, 1.0, 0.5, 0.5]})  # fmt: skip
+                           "network_s": [1.0, 1.0, 0.5, 0.5], "item": ["a", "b"] * 2})  # fmt: skip
     rows = list(claims_of_times(timing, PRINTED_TIMES))
     costs = by_start(rows, "The hyperelastic model costs")
     assert (costs["ours"], costs["uncertainty"]) == ("20.00 s / 3.000 s = 7", "standard error 4")
-    assert by_start(rows, "A hyperelastic map")["uncertainty"].startswith("standard error 10.00 s, 2 maps")
+    assert by_start(rows, "A hyperelastic map takes minutes")["uncertainty"] == "standard error 10.00 s, 2 maps"
+    longer = by_start(rows, "A hyperelastic map takes longer")["ours"]
+    assert longer == "6.12 times as long, geometric mean over objects"  # 10 / 2 and 30 / 4: (5 x 7.5)^(1/2)
     assert by_start(rows, "The hardest maps")["ours"] == "1.3 times (elastic), 1.5 times (hyperelastic)"
 
 
@@ -53,17 +56,23 @@ def of_scores(table):
 
 @pytest.mark.parametrize(("gain", "alike", "loses"), [(0.04, "reproduced", "not reproduced"),
                                                       (0.06, "not reproduced", "reproduced")])  # fmt: skip
-def test_both_models_do_alike_on_smooth_objects_and_the_elastic_one_loses_on_stepped_ones(gain, alike, loses):
-    rows = of_scores(scores(gain))
-    assert by_start(rows, "On smooth objects")["verdict"] == by_start(rows, "On object 4")["verdict"] == alike
-    assert by_start(rows, "One architecture serves")["verdict"] == alike
+def test_both_models_do_alike_on_enough_smooth_objects_and_the_elastic_one_loses_on_stepped_ones(gain, alike, loses, monkeypatch):
+    smooth, stepped = ([f"{name}_{k}" for k in range(6)] for name in ("smooth", "stepped"))
+    monkeypatch.setattr(of_readings, "SMOOTH", smooth)
+    monkeypatch.setattr(of_readings, "STEPPED", stepped)
+    rows = of_scores(scores(gain, items=(*smooth, *stepped)))
+    assert by_start(rows, "On smooth objects")["verdict"] == by_start(rows, "One architecture serves")["verdict"] == alike
+    assert by_start(rows, "On objects 5 and 6")["verdict"] == loses
+    rows = of_scores(scores(gain, items=(*smooth[:5], *stepped)))
+    assert by_start(rows, "On smooth objects")["verdict"] == "undecided"  # five of them
     assert by_start(rows, "On objects 5 and 6")["verdict"] == loses
 
 
-def test_a_missing_object_leaves_its_own_comparison_undecided_and_no_other():
-    rows = of_scores(scores(0.06, items=("object_1", "object_2", "object_4", "object_5", "object_6")))
-    assert by_start(rows, "On smooth objects")["verdict"] == "undecided"
-    assert by_start(rows, "On objects 5 and 6")["verdict"] == "reproduced"
+@pytest.mark.parametrize("gain", [0.0, 0.04, 0.06, 0.5])
+def test_the_papers_six_objects_decide_nothing_about_smooth_and_stepped_ones(gain):
+    rows = of_scores(scores(gain))
+    for start in ("On smooth objects", "On object 4", "On objects 5 and 6"):
+        assert by_start(rows, start)["verdict"] == "undecided"
 
 
 def test_the_best_objects_are_held_against_the_abstract():
@@ -71,6 +80,11 @@ def test_the_best_objects_are_held_against_the_abstract():
     best = [by_start(rows, f"Best object of the {model} model") for model in ("hyperelastic", "elastic")]
     assert [row["paper"] for row in best] == ["0.97", "0.9"]
     assert [row["ours"][:4] for row in best] == ["0.90", "0.60"]
+    trials = pd.DataFrame([{"model": "hyperelastic", "set": "grasps", "item": "object_1", "ssim_low": 0.95, "ssim_high": 0.99}])
+    for interval, verdict in (((0.95, 0.99), "reproduced"), ((0.90, 0.99), "undecided"), ((0.80, 0.91), "not reproduced")):
+        judged = claims_of_scores(scores(0.3), source="published archive", summary=None, ceiling=None,
+                                  per_item=trials.assign(ssim_low=interval[0], ssim_high=interval[1]))  # fmt: skip
+        assert by_start(list(judged), "Best object of the hyperelastic")["verdict"] == verdict, interval
 
 
 def card(rmse):
@@ -79,9 +93,11 @@ def card(rmse):
             "laws": {"ogden2": {"parameters": {}, "rmse_mpa": rmse, "stable_over_data": True}}}  # fmt: skip
 
 
-@pytest.mark.parametrize(("rmse", "verdict"), [(0.0041, "reproduced"), (0.0039, "not reproduced"), (0.0119, "reproduced"),
-                                               (0.0121, "not reproduced")])  # fmt: skip
-def test_a_printed_error_is_met_within_half_of_it(rmse, verdict):
+# 50 points know an RMSE to a tenth of it, so its 95 % interval is 20 % to both sides; half of 0.008 MPa is from 0.004 to 0.012.
+@pytest.mark.parametrize(("rmse", "verdict"), [(0.0050, "reproduced"), (0.0041, "undecided"), (0.0039, "undecided"),
+                                               (0.0033, "not reproduced"), (0.0100, "reproduced"), (0.0119, "undecided"),
+                                               (0.0150, "not reproduced")])  # fmt: skip
+def test_a_printed_error_is_met_where_its_interval_lies_within_half_of_it(rmse, verdict):
     rows = list(claims_of_materials([card(rmse)]))
     own = by_start(rows, "rubber: RMSE of ogden2")
     assert (own["verdict"], own["paper"]) == (verdict, "0.008")
@@ -119,25 +135,6 @@ def test_grasps_are_counted_against_twelve_objects_and_two_thousand_trials(objec
     assert by_start(rows, "The fingers close")["verdict"] == "reproduced"
     far = claims_of_grasps(grasps.assign(force_right_n=force_n * 1.011), {}, force_n=float(force_n), policy="error", model="auto")
     assert by_start(far.to_dict("records"), "The fingers close")["verdict"] == "not reproduced"
-
-
-def test_a_family_whose_hulls_grow_at_its_end_refutes_that_they_stay(monkeypatch):
-    counts = {"NPt": [10, 20, 30, 40], "CHt": [10, 10, 10, 15], "NPo": [10, 20, 30, 40], "CHo": [10, 10, 10, 10]}
-    monkeypatch.setattr(of_models, "detail_family", lambda **_: pd.DataFrame(counts))
-    assert of_models._rising_detail((22.0, 37.0))["verdict"] == "not reproduced"
-    counts["CHt"][-1] = 14
-    row = of_models._rising_detail((22.0, 37.0))
-    assert row["verdict"] == "reproduced" and "NPt 10 to 40, CHt 10 to 14" in row["ours"]
-
-
-@pytest.mark.parametrize("pits", [1, 3])
-def test_a_pitted_plate_has_its_pits(pits):
-    """Its underside at height 0: all but pits^2 of the (2 pits + 1)^2 cells of a side of 16 mm."""
-    triangles = of_models._pitted_plate(pits)
-    low = triangles[(triangles[..., 2] == 0).all(axis=1)]
-    area = 0.5 * np.linalg.norm(np.cross(low[:, 1] - low[:, 0], low[:, 2] - low[:, 0]), axis=1).sum()
-    assert area == pytest.approx(256 * (1 - pits**2 / (2 * pits + 1) ** 2))
-    assert np.abs(triangles[..., :2]).max() == pytest.approx(8)
 
 
 def probe_tables(*, soft=55.0, hard=79.0, low=50.0, high=52.0, bends=1.5):

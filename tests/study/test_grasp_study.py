@@ -114,10 +114,11 @@ def verdicts(row, shares):
 
 def test_claims_hold_by_their_rules_alone():
     good = verdicts(GRASP, [0.02, 0.6])
-    assert good["A"] == good["The"] == good["object"] == "reproduced" and good["Twelve"] == "not reproduced"
+    assert good["A"] == good["The"] == "reproduced" and good["Twelve"] == "not reproduced"
     assert verdicts(GRASP | {"model_grip_left": "hyperelastic"}, [0.02, 0.6])["A"] == "not reproduced"
     assert verdicts(GRASP | {"force_left_n": 48.0}, [0.02, 0.6])["The"] == "not reproduced"
-    assert verdicts(GRASP, [0.2, 0.6])["object"] == verdicts(GRASP, [0.02, 0.2])["object"] == "not reproduced"
+    for shares in ([0.02, 0.6], [0.2, 0.6], [0.02, 0.2]):      # one event, and no truth beside the two models
+        assert verdicts(GRASP, shares)["In"] == "undecided"
     assert good["SSIM"] == "needs the archive"
 
 

@@ -22,7 +22,7 @@ if not STUDY.archive:
         input:
             code=code("measure_features"),
             objects=[item.file for item in GRASPS],
-            presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.tested],
+            presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.learnt_from],
         output:
             features=f"{RESULTS}/evaluation/features.csv",
         log:
@@ -74,7 +74,13 @@ rule make_tables:
         benchmark_of("make_tables")
     params:
         files=files,
-        settings=as_settings(**plain(STUDY.values.complexity), source=STUDY.source, models=STUDY.tested, sensor=STUDY.spec.name),
+        settings=as_settings(
+            **plain(STUDY.values.complexity),
+            source=STUDY.source,
+            models=STUDY.tested,
+            reference=STUDY.values.reference,
+            sensor=STUDY.spec.name,
+        ),
     shell:
         run_stage("make_tables")
 

@@ -119,6 +119,20 @@ def largest_parting_in_tension(laws: Mapping[str, Law]) -> tuple[float, str]:
             f"{TENSION[ratios.argmax()]:.2f}")
 
 
+def longest_common_test(laws: Mapping[str, Law], *, allowed_mpa: float, to: float = 2.5, points: int = 3000) -> float:
+    """The largest stretch of a uniaxial tensile test that two laws {name: Law} can both be fits of; `to` where they never part.
+
+    allowed_mpa: the sum of both fits' RMSE. Two curves that lie within e1 and e2 of the same data (root mean square over the test)
+    lie within e1 + e2 of each other; a test to stretch s has points evenly spaced in stretch from 1 to s.
+    """
+    one, other = laws.values()
+    stretch = np.linspace(1.0, to, points + 1)[1:]
+    gap = one.nominal_stress("uniaxial", stretch) - other.nominal_stress("uniaxial", stretch)
+    rms = np.sqrt(np.cumsum(gap**2) / np.arange(1, points + 1))
+    apart = np.flatnonzero(rms > allowed_mpa)
+    return float(stretch[apart[0]]) if len(apart) else to
+
+
 def _parting(quantity, values, factor):
     """The sentence on the two laws farthest apart, or None."""
     if len(values) < 2:

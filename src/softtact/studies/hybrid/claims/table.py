@@ -1,7 +1,8 @@
 """The paper's claims, each with its number, ours, and a verdict computed by the rule that stands beside it.
 
 `reproduced` is a verdict on numbers of ours alone. Rows that hold the paper's numbers against each other are `consistent in print`
-or `contradicts itself`. A rule on a number has two sides: too large is as wrong as too small.
+or `contradicts itself`. A rule on a number has two sides: too large is as wrong as too small. A claim on objects is decided by one
+rule for all (`evaluation.decisions`): few objects, or an interval that holds the limit, leave it `undecided`.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,9 +14,13 @@ import pandas as pd
 from softtact.evaluation.claim_rows import ARCHIVE, COLUMNS, MEASUREMENTS
 from softtact.evaluation.score_tables import untrained
 from softtact.published.archive import SOURCE as PUBLISHED
-from softtact.studies.hybrid.claims.of_models import claims_of_choice, claims_of_maps, claims_of_times
-from softtact.studies.hybrid.claims.of_readings import PAPERS_SENSOR, VIRTUAL, claims_of_scores, claims_of_study
-from softtact.studies.hybrid.claims.of_tests import claims_in_print, claims_of_dielectric, claims_of_materials
+from softtact.studies.hybrid.claims.in_print import claims_in_print
+from softtact.studies.hybrid.claims.of_choice import claims_of_choice
+from softtact.studies.hybrid.claims.of_maps import claims_of_maps
+from softtact.studies.hybrid.claims.of_readings import VIRTUAL, claims_of_scores
+from softtact.studies.hybrid.claims.of_study import PAPERS_SENSOR, claims_of_study
+from softtact.studies.hybrid.claims.of_tests import claims_of_dielectric, claims_of_materials
+from softtact.studies.hybrid.claims.of_times import claims_of_times
 
 if TYPE_CHECKING:
     from softtact.studies.hybrid.tables import Counts, Times
@@ -48,6 +53,8 @@ class Evidence:
     """Of the readings; a verdict on the paper's numbers needs the published archive's."""
     sensor: str = PAPERS_SENSOR
     """The sensor's name."""
+    reference: str = "reference"
+    """Name of the model that the virtual sensor reads: in `features` the truth beside the tested models."""
     summary: pd.DataFrame | None = None
     """Mean SSIM of each model and set, with intervals."""
     per_item: pd.DataFrame | None = None
@@ -55,7 +62,7 @@ class Evidence:
     ceiling: pd.DataFrame | None = None
     """SSIM of repeated readings of one press against each other."""
     features: pd.DataFrame | None = None
-    """Features of each object's deformation map, by model."""
+    """Features of each object's deformation map, by model; of the reference, too, where readings are the virtual sensor's."""
     scores: pd.DataFrame | None = None
     """The `score_table` of networks and trivial predictors."""
     searches: dict[str, dict[str, Any]] | None = None
@@ -72,9 +79,9 @@ def claims(evidence: Evidence) -> pd.DataFrame:
     rows = [*claims_of_materials(evidence.cards), *claims_of_dielectric(evidence.ftir),
             *claims_of_choice(evidence.complexity, choose=evidence.choose, printed_counts=evidence.printed_counts,
                               ssim=evidence.ssim, timing=evidence.timing, source=evidence.source),
-            *claims_of_maps(evidence.features, evidence.complexity),
+            *claims_of_maps(evidence.features, evidence.complexity, reference=evidence.reference, source=evidence.source),
             *claims_of_scores(evidence.ssim, source=evidence.source, summary=evidence.summary, per_item=evidence.per_item,
-                              ceiling=evidence.ceiling, untrained=bad),
+                              ceiling=evidence.ceiling, untrained=bad, scores=evidence.scores),
             *claims_of_times(evidence.timing, evidence.printed_times),
             *claims_of_study(searches=evidence.searches, repeated=evidence.repeated, taxels=evidence.taxels,
                              sensor=evidence.sensor, untrained=bad, source=evidence.source),

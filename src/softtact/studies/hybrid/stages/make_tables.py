@@ -3,7 +3,8 @@
 inputs: cards (list), complexity, ftir, ssim, summary, per_item, ceiling, timing, scores, taxels, searches (best.json of each
     model); if objects were pressed also features, and pressed and repeated (lists of the same presses, made twice)
 outputs: table1, contradictions, table2, table3, claims
-settings: rule, thresholds {total, overlap}, source (of the readings), models (of the searches), sensor (its name)
+settings: rule, thresholds {total, overlap}, source (of the readings), models (of the searches), reference (the model that the
+    virtual sensor reads), sensor (its name)
 """
 
 from typing import Any
@@ -44,7 +45,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     write_csv(outputs["claims"], claims(Evidence(
         cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim, timing=timing, choose=choose,
         printed_counts=PRINTED_COUNTS, printed_times=PRINTED_TIMES, source=settings["source"], sensor=settings["sensor"],
-        searches=searches, repeated=_differences(inputs), **scores)))
+        reference=settings["reference"], searches=searches, repeated=_differences(inputs), **scores)))
 
 
 def _differences(inputs):

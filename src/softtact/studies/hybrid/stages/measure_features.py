@@ -1,6 +1,7 @@
 """Measure the features of the grasped objects in their deformation maps.
 
-inputs: objects (list of meshes), presses (list: every model of every object);  outputs: features (CSV)
+inputs: objects (list of meshes), presses (list: of every object with the tested models, and that which the virtual sensor reads)
+outputs: features (CSV)
 settings: objects [{name, unit, pose}, ...], frustum_height_mm
 """
 
