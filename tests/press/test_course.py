@@ -122,6 +122,7 @@ def test_a_fast_model_by_itself_states_the_interval_of_its_own(sensor):
             sensor.press(BALL, force_n=[0.5], model="elastic", label=""), model=model, attributes={},
             frustum_compression_mm=np.array([0.01]), expected_error_mm=np.array([np.nan]))).attributes
         assert (told["expected_error_times_low"], told["expected_error_times_high"]) == choice.INTERVALS[name]
+        assert told["expected_error_calibrated_on"] == "coro"
 
 
 def test_a_model_that_fails_falls_through_to_the_next(fakes):
@@ -143,7 +144,7 @@ def test_the_papers_rule_is_taken_where_it_is_asked_for(fakes):
 
 def test_a_fast_model_states_the_interval_of_its_error_and_the_hyperelastic_one_none(fakes):
     told = {name for name in chosen().attributes if "expected_error" in name}
-    assert told == {"expected_error_times_low", "expected_error_times_high"}
+    assert told == {"expected_error_times_low", "expected_error_times_high", "expected_error_calibrated_on"}
     fakes["elastic"] = fakes["foundation"] = ConvergenceError("not reached")
     assert not any("expected_error" in name for name in chosen().attributes)
 

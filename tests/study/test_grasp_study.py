@@ -14,7 +14,7 @@ from softtact.geometry.pose import Pose
 from softtact.studies.cost import read_costs
 from softtact.studies.grasps.claims import claims_of_grasps
 from softtact.studies.grasps.config import GraspStudy
-from softtact.studies.grasps.stages.summary import papers_model
+from softtact.studies.grasps.stages.summary import _result, papers_model
 from softtact.studies.jobs import run_jobs
 from softtact.studies.registry import OpenStudy, open_study
 
@@ -110,6 +110,13 @@ def verdicts(row, shares):
                               attrs={"force_n": 50.0, "cover_law": "ogden2"})
     table = claims_of_grasps(pd.DataFrame([row]), {"object_5": compared}, force_n=50.0, policy="paper", model="auto")
     return table.set_index(table.claim.str.split(" ").str[0]).verdict.to_dict()
+
+
+def test_the_page_says_where_taxels_are_at_the_end_of_the_converters_range():
+    row = {"status": "done", "object": "a", "trials": 2, "valid_left": 1, "valid_right": 1, "at_range_end_left": 0}
+    assert "converter" not in _result(pd.DataFrame([row | {"at_range_end_right": 0}]))
+    full = _result(pd.DataFrame([row | {"at_range_end_right": 3}]))
+    assert "readings of 1 pads taxels are at the end of the converter's range" in full
 
 
 def test_claims_hold_by_their_rules_alone():

@@ -267,7 +267,8 @@ def _summary_on_layers(result):
     load_steps = {"normal_force_n": result.normal_force_n, "force_n": result.force_n, "indentation_mm": result.indentation_mm,
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2))}
-    load_steps |= {"tactile_map": result.tactile_map} if "taxels" in result.readings else {}
+    if "taxels" in result.readings:
+        load_steps |= {"tactile_map": result.tactile_map, "taxels_at_range_end": result.taxels_at_range_end}
     names = ("penetration_mm", "frustum_compression_mm", "residual_n", "extrapolated_volume_fraction", "expected_error_mm",
              "within_validity",
              "iterations", "wall_time_s")
@@ -276,6 +277,8 @@ def _summary_on_layers(result):
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
     facts["expected_error_interval"] = ([result.attributes[f"expected_error_times_{end}"] for end in ("low", "high")]
                                         if "expected_error_times_low" in result.attributes else None)
+    facts["expected_error_calibrated_on"] = result.attributes.get("expected_error_calibrated_on")
+    facts |= {"sensor": result.sensor, "largest_counts": result.largest_counts}
     return facts | {name: _or_none(values) for name, values in load_steps.items()}
 
 
@@ -311,12 +314,25 @@ def _lines_on_layers(summary):
     yield from _quality_lines(summary)
 
 
-def _error_line(expected_um, interval):
+def _error_line(summary):
     """The expected error of a fast model against the hyperelastic model, with an interval for the true error."""
-    if interval is not None:
-        low, high = (factor * expected_um for factor in interval)
-        yield (f"error to expect against the hyperelastic model: {expected_um:.2g} um ({low:.2g} to {high:.2g}), root mean square "
-               "over the map")
+    interval, expected_um = summary["expected_error_interval"], 1e3 * max(summary["expected_error_mm"])
+    if interval is None:
+        return
+    low, high = (factor * expected_um for factor in interval)
+    known_of = summary["expected_error_calibrated_on"]
+    other = f"; calibrated on the sensor {known_of}, not on {summary['sensor']}" if known_of != summary["sensor"] else ""
+    yield (f"error to expect against the hyperelastic model: {expected_um:.2g} um ({low:.2g} to {high:.2g}), root mean square over "
+           f"the map{other}")
+
+
+def _range_line(summary):
+    """The load steps at which taxels read the end of the converter's range: there the true change is larger than the counts."""
+    numbers = summary.get("taxels_at_range_end", [])
+    if any(numbers):
+        steps = ", ".join(f"{number:g} at {force:.4g} N" for number, force in zip(numbers, summary["normal_force_n"], strict=True)
+                          if number)
+        yield f"taxels at the end of the converter's range ({summary['largest_counts']:g} counts), which read too little: {steps}"
 
 
 def _quality_lines(summary):
@@ -327,7 +343,8 @@ def _quality_lines(summary):
     if None not in summary["frustum_compression_mm"]:
         yield f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm"
     if None not in summary["expected_error_mm"]:
-        yield from _error_line(1e3 * max(summary["expected_error_mm"]), summary["expected_error_interval"])
+        yield from _error_line(summary)
+    yield from _range_line(summary)
     if not all(summary["within_validity"]):
         flagged = zip(summary["normal_force_n"], summary["within_validity"], strict=True)
         forces = ", ".join(f"{force:.4g}" for force, valid in flagged if not valid)

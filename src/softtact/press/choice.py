@@ -120,9 +120,10 @@ def with_expected_error(sensor: "Sensor", result: PressResult) -> PressResult:
 
 
 def _with_interval(result, name):
-    """The result with the percentiles of the true over the expected error as attributes."""
+    """The result with the percentiles of the true over the expected error, and where both come from, as attributes."""
     low, high = INTERVALS[name]
-    return replace(result, attributes=result.attributes | {"expected_error_times_low": low, "expected_error_times_high": high})
+    return replace(result, attributes=result.attributes | {
+        "expected_error_times_low": low, "expected_error_times_high": high, "expected_error_calibrated_on": CALIBRATED_ON})
 
 
 def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course, *, policy: str,

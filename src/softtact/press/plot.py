@@ -52,7 +52,8 @@ def _rows(result, full_scale):
     taxels = result.readings.get("taxels")
     if taxels is not None and result.deformation_map_mm is not None and taxels.dims == ("step", "row", "column"):
         highest = result.largest_counts if full_scale else max(float(result.tactile_map.max()), 1.0)
-        yield _draw_taxels, "taxels: y (mm)", "counts, ideal readout", highest
+        ends = " (some at the end of the range)" if result.taxels_at_range_end.any() else ""
+        yield _draw_taxels, "taxels: y (mm)", f"counts, ideal readout{ends}", highest
     if result.solid is not None:
         largest = float(np.linalg.norm(result.solid.displacement_mm, axis=2).max()) or 1.0
         yield _draw_solid, "solids: z (mm)", "displacement (mm)", largest

@@ -157,6 +157,11 @@ class PressResult:
         values: np.ndarray = self.readings["taxels"].values
         return values
 
+    @property
+    def taxels_at_range_end(self) -> np.ndarray:
+        """(step,) how many taxels read `largest_counts`, where the converter ends: what they feel is more than they read."""
+        return (self.tactile_map >= self.largest_counts).sum(axis=(1, 2))
+
     def load(self, frame: str) -> np.ndarray:
         """Loads (s, 6) in N and N mm of a frame of the solids by its name, such as `object`."""
         if self.solid is None:

@@ -178,11 +178,13 @@ class HardnessVerdict:
     change_with_load: float
     """Largest value over the least, less 1, of a tissue of one height; the worst of all."""
     change_with_height: float
-    """The same over heights, at the largest load."""
+    """The same over heights, at the largest load; 0 of one height, which shows nothing."""
     contrast: float
     """Value of the hardest tissue over that of the softest one at the largest load; the least over heights."""
     apart: bool
     """Whether the values of any two tissues do not overlap over all loads and heights."""
+    heights: int
+    """How many heights of tissue the table holds."""
 
 
 def verdict(table: pd.DataFrame, column: str) -> HardnessVerdict:
@@ -195,4 +197,5 @@ def verdict(table: pd.DataFrame, column: str) -> HardnessVerdict:
     by_height = last.groupby("tissue_height_mm")[column]
     return HardnessVerdict(change(table.groupby(["tissue", "tissue_height_mm"])[column]), change(last.groupby("tissue")[column]),
                            float((by_height.max() / by_height.min()).min()),
-                           bool((ranges["min"].to_numpy()[1:] > ranges["max"].to_numpy()[:-1]).all()))
+                           bool((ranges["min"].to_numpy()[1:] > ranges["max"].to_numpy()[:-1]).all()),
+                           int(table.tissue_height_mm.nunique()))

@@ -83,6 +83,8 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     page.box("What is not here.", missing(settings, archive=archive is not None))
     page.box("What is synthetic here.", _synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings))
     page.text(_archive_facts(settings, archive) if archive else _facts(settings))
+    if "gains" in inputs:
+        page.text(range_end_sentence(pd.read_csv(inputs["gains"]), settings["config"]))
     for text, anchor in (("Configuration", "config"), ("Code", "code")):
         page.other_page(text, f"{SOURCES_PAGE}#{anchor}")
     _show_figures(page, inputs["figures"], settings["sources"], {"fig5_ftir": ftir["verdict"]})
@@ -177,6 +179,16 @@ def _archive_facts(settings, archive):
             f"(published/outliers.csv). {archive['sentence']} No object was pressed, so figures 2, 7 and 8 and our times "
             "are not here. "
             f"Seed {settings['seed']}.")
+
+
+def range_end_sentence(gains: pd.DataFrame, config: dict[str, Any]) -> str:
+    """How many taxels of the virtual sensor read the end of the converter's range; nothing where the study's gain is not listed."""
+    gain = config.get("virtual_sensor", {}).get("counts_per_relative_change")
+    own = gains[gains.gain == gain]
+    if not len(own) or not own.full_share.iloc[0] > 0:
+        return ""
+    return (f"At the largest force {own.full_share.iloc[0]:.1%} of the taxels' readings on grasped objects are at the end of the "
+            "converter's range: they read less than the taxels feel, and no model's counts there can be told right from wrong.")
 
 
 def _synthetic_but_for_the_archive(ftir):

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 GRIP = 1     # number of the event `grip` in `softtact.robot.events.EVENTS`
 _MOST_COLUMNS = 6
 _SHOWN = ["grasp", "status", "x_mm", "y_mm", "angle_deg", "trials", "force_left_n", "force_right_n", "model_grip_left",
-          "model_grip_right", "deepest_left_mm", "deepest_right_mm", "counts_left", "counts_right", "trial_sd_left_counts",
-          "trial_sd_right_counts", "message"]
+          "model_grip_right", "deepest_left_mm", "deepest_right_mm", "counts_left", "counts_right",
+          "at_range_end_left", "at_range_end_right", "trial_sd_left_counts", "trial_sd_right_counts", "message"]
 
 
 def tabulate_grasps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -130,6 +130,7 @@ def _facts(data, readings, mesh, spec):
                 f"rule_{name}": papers_model(placed, footprint_mm=spec.footprint_mm, reach_mm=spec.thickness_mm),
                 f"valid_{name}": int(data.within_validity[GRIP, finger]),
                 f"deepest_{name}_mm": float(data.deformation_map_mm[GRIP, finger].max()),
+                f"at_range_end_{name}": int((readings.tactile_map[finger] >= spec.largest_counts).any("trial").sum()),
                 f"counts_{name}": float(readings.tactile_map[finger].sum(dim=("row", "column")).mean()),
                 f"trial_sd_{name}_counts": float(spread.mean())}
     return row
@@ -209,4 +210,7 @@ def _result(grasps):
     invalid = int((done[["valid_left", "valid_right"]] != 1).to_numpy().sum()) if len(done) else 0
     if invalid:
         result += f" {invalid} presses at the grip are beyond what their model is valid for; their maps are not to be relied on."
+    full = int((done[["at_range_end_left", "at_range_end_right"]] > 0).to_numpy().sum()) if len(done) else 0
+    if full:
+        result += (f" In the readings of {full} pads taxels are at the end of the converter's range, and read less than they feel.")
     return result

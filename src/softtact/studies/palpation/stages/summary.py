@@ -1,12 +1,16 @@
 """The report of a palpation sensor, and all facts of its study in one file."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from softtact.files import digest, read_json, write_json
 from softtact.probe.design import PalpationDesign
+from softtact.studies.palpation.claims import NOT_JUDGED
+
+if TYPE_CHECKING:
+    from softtact.reporting.page import Page
 
 _CAPTIONS = {
     "fig2_shapes": "Mesh and deformed shapes (the paper's figure 2); displacements are to scale.",
@@ -39,12 +43,22 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
         page.text(sentence)
     page.figures((path, _CAPTIONS[path.stem]) for path in inputs["figures"])
     page.tables(_TITLES, files)
-    page.claims(pd.read_csv(files["claims"], keep_default_na=False), file=files["claims"])
+    _show_claims(page, files["claims"])
     page.section("Files")
     page.text("", links=[(label, [(Path(path).name, page.link(path)) for path in paths]) for label, paths in (
         ("Curves", [files["curves"], *inputs["sweeps"]]), ("Fields for ParaView", inputs["fields"]))])
     page.write(outputs["page"])
     write_json(outputs["summary"], facts | {"design": design.name, "config_digest": digest(design.model_dump(mode="json"))})
+
+
+def _show_claims(page: "Page", file: Path) -> None:
+    """The section of the paper's claims; of a user's tissues a sentence that none is judged."""
+    claims = pd.read_csv(file, keep_default_na=False)
+    if len(claims):
+        page.claims(claims, file=file)
+        return
+    page.section("The paper's claims", anchor="claims")
+    page.text(NOT_JUDGED)
 
 
 def _conditions(design: PalpationDesign, facts: dict[str, Any]) -> str:
@@ -68,9 +82,12 @@ def _assumptions(design: PalpationDesign) -> list[str]:
 def _on_hardness(verdicts):
     for column in sorted(verdicts, reverse=True):     # puts the paper's measure first
         found = verdicts[column]
-        yield (f"{column}: changes with load by up to {found['change_with_load']:.1%}, with the tissue's height by up to "
-               f"{found['change_with_height']:.1%}; hardest over softest tissue {found['contrast']:.2f} or more; tissues "
-               f"{'are' if found['apart'] else 'are not'} told apart whatever load and height.")
+        heights = found["heights"]
+        by_height = (f"with the tissue's height by up to {found['change_with_height']:.1%}" if heights > 1 else
+                     "and was measured at one height of the tissue, which says nothing of others")
+        yield (f"{column}: changes with load by up to {found['change_with_load']:.1%}, {by_height}; hardest over softest tissue "
+               f"{found['contrast']:.2f} or more; tissues {'are' if found['apart'] else 'are not'} told apart at the loads and the "
+               f"{f'{heights} heights' if heights > 1 else 'one height'} that were tried.")
 
 
 def _on_lumps(facts):

@@ -56,8 +56,7 @@ def tabulate(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[
     mesh_error = float((coarse.line_n_mm / moved.line_n_mm - 1).abs().max())
     hardness = pd.concat([pd.read_csv(path, float_precision="round_trip") for path in inputs.get("hardness", [])]
                          or [pd.DataFrame()], ignore_index=True)
-    claims = claims_of_probe(curves, slopes, hardness if len(hardness) else None,
-                             mesh_error=f"{mesh_error:.1%} between this mesh and one half as fine")
+    claims = claims_of_probe(curves, slopes, hardness if len(hardness) else None, mesh_error=mesh_error)
     variants = [one | _slope_row(_sweep(path)) for one, path in zip(settings["variants"], inputs.get("variants", []), strict=True)]
     tables = {"curves": curves, "slopes": slopes, "claims": claims, "hardness": hardness,
               "variants": pd.DataFrame(variants, columns=["variant", "tissue", "line_n_mm", "initial_n_mm", "force_n"])}
