@@ -61,14 +61,14 @@ PRESS = "press part.stl --unit mm --force 5"
 
 @pytest.mark.parametrize(("line", "sentence"), [
     (f"{FIT} --weight planr=5", "The weight of 'planr': there is no test mode 'planr'; did you mean 'planar'?"),
-    (f"{FIT} --weight planar=5", "The weight of planar has no effect, for there is no planar curve"),
+    (f"{FIT} --weight planar=5", "The weight of planar has no effect, as there is no planar curve"),
     (f"{FIT} --weight uniaxial=5", "The weight of the only mode has no effect"),
     (f"{FIT} volumetric=volume.csv --weight volumetric=5", "The weight of volumetric has no effect"),
-    (f"{FIT} --window planar=1:1.2", "The window of planar has no effect, for there is no planar curve"),
+    (f"{FIT} --window planar=1:1.2", "The window of planar has no effect, as there is no planar curve"),
     (f"{FIT} --window uniaxial=1:1.2 --window uniaxial=1:1.5", "uniaxial was already given as 1:1.2; give it once"),
     (f"{FIT} --small-strain 0.2", "--small-strain 0.2: it has no effect without --poisson or a volumetric curve"),
     (f"{FIT} volumetric=volume.csv --bulk-over-shear 20", "--bulk-over-shear 20: it has no effect beside a volumetric curve"),
-    (f"{FIT} --mode planar", "the mode planar for all files has no effect, for each states one"),
+    (f"{FIT} --mode planar", "the mode planar for all files has no effect, as each states one"),
     (f"{FIT} --layout soro_db --column stretch=x", "`columns` has no effect on the layout soro_db"),
     (f"{FIT} --poisson 0.5", "poisson is 0.5; give a value above -1 and below 0.5"),
     ("fit neoprene --decimal , --out card.json", "names its files and options; give it without others"),

@@ -222,7 +222,7 @@ def test_corners_on_an_edge_that_differ_on_its_two_sides_become_both_facets(tmp_
 
 def test_a_concave_polygon_cut_from_one_corner_is_refused_without_repair_too(tmp_path):
     cut_from_one_corner(None).export(tmp_path / "u.stl")
-    with pytest.raises(InputError, match=r"u.stl: 3 facets lie on a neighbour \(the first at .* mm\).*triangulate the mesh anew"):
+    with pytest.raises(InputError, match=r"u.stl: 3 facets lie on a neighbour \(the first at .* mm\).*triangulate it again"):
         read_mesh(tmp_path / "u.stl", unit="mm")
 
 

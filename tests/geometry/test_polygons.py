@@ -78,8 +78,8 @@ def test_a_bent_quadrilateral_is_split_alike_from_any_corner():
     ([(0, 0, 0), (3, 2, 0), (3, 0, 0), (0, 9, 0)], "crosses itself"),
     ([(0, 0, 0), (4, 4, 0), (4, 0, 0), (0, 4, 0), (-1, 2, 0)], "the polygon of 5 corners crosses itself"),
     ([(np.cos(a), np.sin(a), 0) for a in 0.8 * np.pi * np.arange(5)], "crosses itself"),
-    ([(0, 0, 0), (10, 0, 0), (10, 10, 0), (0, 10, 6), (-1, 5, 0)], "leaves one plane so far"),
-    ([(0, 0, 0), (10, 0, 9), (10, 10, 0), (0, 10, 9)], "leaves one plane so far"),
+    ([(0, 0, 0), (10, 0, 0), (10, 10, 0), (0, 10, 6), (-1, 5, 0)], "is so far from a plane"),
+    ([(0, 0, 0), (10, 0, 9), (10, 10, 0), (0, 10, 9)], "is so far from a plane"),
 ], ids=["bow-tie", "uneven bow-tie", "crossed sides", "pentagram", "bent pentagon", "saddle"])
 def test_a_polygon_that_crosses_itself_or_is_bent_is_refused_with_its_line(corners, said):
     with pytest.raises(InputError, match=f"mesh.obj: line 7: .*{said}"):

@@ -18,8 +18,9 @@ from softtact.models.hyperelastic.path import press_load_steps
 def operations(pattern, places):
     """How many operations and entries a factor in the order of the dissection takes."""
     fronts, _ = lay_out(pattern.indptr, pattern.indices, dissect(pattern.indptr, pattern.indices, places))
-    own, bound = np.diff(fronts.own_at).astype(float), np.diff(fronts.bound_at)
-    return np.sum(own**3 / 3 + own**2 * bound + own * bound**2), np.sum(own * (own + 1) / 2 + own * bound)
+    pivots, boundary = np.diff(fronts.pivot_at).astype(float), np.diff(fronts.boundary_at)
+    count = np.sum(pivots**3 / 3 + pivots**2 * boundary + pivots * boundary**2)
+    return count, np.sum(pivots * (pivots + 1) / 2 + pivots * boundary)
 
 
 def energy_error(whole, found, right):
@@ -40,10 +41,10 @@ def test_every_unknown_is_in_one_piece_and_no_entry_joins_the_two_sides_of_a_cut
     _, upper, places = plate(30, 17)
     pieces = dissect(upper.indptr, upper.indices, places)
     assert len(pieces) > 5
-    np.testing.assert_array_equal(np.sort(np.concatenate([piece.own for piece in pieces])), np.arange(len(places)))
+    np.testing.assert_array_equal(np.sort(np.concatenate([piece.pivots for piece in pieces])), np.arange(len(places)))
     below = []
     for piece in pieces:
-        below.append(np.concatenate([piece.own, *(below[k] for k in piece.before)]))
+        below.append(np.concatenate([piece.pivots, *(below[k] for k in piece.before)]))
         for k in piece.before:
             for other in piece.before:
                 assert k == other or not upper[below[k]][:, below[other]].nnz
@@ -64,15 +65,15 @@ def test_triangles_and_rows_of_16_bits_hold_the_factor(workers):
         assert solver.factor(upper)
         fronts, store, order, n = solver._fronts, solver._store, solver._order, len(places)
         factor = np.zeros((n, n))
-        for p in range(len(fronts.own_at) - 1):
-            first, end = fronts.own_at[p], fronts.own_at[p + 1]
-            bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
-            own = np.zeros((end - first, end - first))
-            own[np.triu_indices(end - first)] = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
-            np.fill_diagonal(own, 1.0 / own.diagonal())
+        for p in range(len(fronts.pivot_at) - 1):
+            first, end = fronts.pivot_at[p], fronts.pivot_at[p + 1]
+            boundary = fronts.boundary[fronts.boundary_at[p]:fronts.boundary_at[p + 1]]
+            triangle = np.zeros((end - first, end - first))
+            triangle[np.triu_indices(end - first)] = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
+            np.fill_diagonal(triangle, 1.0 / triangle.diagonal())
             short = store.short[fronts.short_at[p]:fronts.short_at[p + 1]].reshape(end - first, -1)
-            factor[first:end, first:end] = own
-            factor[first:end, bound] = store.scale[first:end, None] * short
+            factor[first:end, first:end] = triangle
+            factor[first:end, boundary] = store.scale[first:end, None] * short
         # An entry is off by half a unit of 16 bits, 1.5e-5 of its row's largest, which is 1 here; up to 70 of them meet.
         np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-4)
 
@@ -121,12 +122,12 @@ def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_fac
 
 
 def test_plates_that_nothing_joins_are_solved_together():
-    # Apart by more than either is wide, so that a cut between them has no unknowns of its own.
+    # Farther apart than either is wide, so that the cut between them has no unknowns.
     (one, _, here), (other, _, there) = plate(20, 12), plate(12, 20)
     whole, places = sp.block_diag([one, other], format="csr"), np.vstack([here, there + [40.0, 0.0]])
     upper = sp.triu(whole, format="csr")
     upper.sort_indices()
-    assert any(not len(piece.own) for piece in dissect(upper.indptr, upper.indices, places))
+    assert any(not len(piece.pivots) for piece in dissect(upper.indptr, upper.indices, places))
     solver, right = DissectedSolver(places), np.random.default_rng(0).normal(size=len(places))
     assert solver.factor(upper)
     np.testing.assert_allclose(whole @ solver.solve(right), right, atol=1e-3)
@@ -134,7 +135,7 @@ def test_plates_that_nothing_joins_are_solved_together():
 
 def test_what_stood_in_its_memory_before_does_not_count(monkeypatch):
     # The last piece has nothing beyond itself, and so no rows of 16 bits; their scale was left as memory had it, mostly a number.
-    stored = DissectedSolver._stored
+    stored = DissectedSolver._allocated
 
     def with_rubbish(self, **sizes):
         store = stored(self, **sizes)
@@ -142,7 +143,7 @@ def test_what_stood_in_its_memory_before_does_not_count(monkeypatch):
             values[:] = np.nan if values.dtype == np.float32 else -1
         return store
 
-    monkeypatch.setattr(DissectedSolver, "_stored", with_rubbish)
+    monkeypatch.setattr(DissectedSolver, "_allocated", with_rubbish)
     whole, upper, places = plate(20, 12)
     solver, right = DissectedSolver(places), np.ones(len(places))
     assert solver.factor(upper)

@@ -58,8 +58,8 @@ def test_a_body_of_irregular_tetrahedra_is_dissected_with_a_fifth_less_operation
 
     def operations():
         fronts, _ = lay_out(upper.indptr, upper.indices, dissect(upper.indptr, upper.indices, points))
-        own, bound = np.diff(fronts.own_at).astype(float), np.diff(fronts.bound_at)
-        return np.sum(own**3 / 3 + own**2 * bound + own * bound**2)
+        pivots, boundary = np.diff(fronts.pivot_at).astype(float), np.diff(fronts.boundary_at)
+        return np.sum(pivots**3 / 3 + pivots**2 * boundary + pivots * boundary**2)
 
     with monkeypatch.context() as patched:
         patched.setattr("softtact.linalg.symbolic.shortened", lambda graph, side, cost: side)

@@ -301,7 +301,7 @@ def test_a_law_used_outside_its_card_warns_and_inside_it_does_not(card, recwarn)
     law.nominal_stress("uniaxial", np.array([0.7, 1.5]))
     assert not recwarn.list
     with pytest.warns(ExtrapolationWarning,
-                      match="used at principal stretches 0.577 to 3; its card rests on data from 0.51 to 1.6"):
+                      match="used at principal stretches 0.577 to 3; its card is based on data from 0.51 to 1.6"):
         law.nominal_stress("uniaxial", np.array([1.0, 3.0]))
 
 

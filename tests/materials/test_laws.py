@@ -194,7 +194,7 @@ def test_a_law_warns_beyond_either_end_of_its_window_and_not_at_the_ends(recwarn
     law.nominal_stress("uniaxial", np.array([0.46, 3.99]))
     assert not recwarn.list
     for stretch in (0.44, 4.01):
-        with pytest.warns(ExtrapolationWarning, match="rests on data from 0.45 to 4"):
+        with pytest.warns(ExtrapolationWarning, match="is based on data from 0.45 to 4"):
             law.nominal_stress("uniaxial", stretch)
 
 

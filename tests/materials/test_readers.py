@@ -111,7 +111,7 @@ def test_a_missing_file_is_refused(tmp_path):
 def test_a_mode_for_all_files_that_changes_nothing_is_refused_and_one_that_does_is_not(write_file, published):
     path = write_file(PLAIN, "planar.csv")
     assert read_curves([path], mode="uniaxial")[0].mode == "uniaxial"
-    with pytest.raises(InputError, match="the mode uniaxial for all files has no effect, for each states one"):
+    with pytest.raises(InputError, match="the mode uniaxial for all files has no effect, as each states one"):
         read_curves([f"equibiaxial={path}"], mode="uniaxial")
     with pytest.raises(InputError, match="has no effect"):
         read_curves(published / "literature" / "Treloar_1944", layout="literature", mode="uniaxial")
@@ -126,10 +126,10 @@ def test_a_mapped_header_that_no_file_has_is_refused(write_file):
 def test_a_window_or_a_weight_that_changes_nothing_is_refused():
     for window, weights, modes, sentence in (
         ({"planr": (1, 2)}, {}, ["planar"], "The window of 'planr': .*planar"),
-        ({}, {"planar": 2.0}, ["uniaxial", "equibiaxial"], "The weight of planar has no effect, for there is no planar curve"),
+        ({}, {"planar": 2.0}, ["uniaxial", "equibiaxial"], "The weight of planar has no effect, as there is no planar curve"),
         ({}, {"uniaxial": 2.0}, ["uniaxial"], "The weight of the only mode has no effect"),
         ({}, {"uniaxial": 2.0}, ["uniaxial", "volumetric"], "The weight of the only mode has no effect"),
-        ({}, {"volumetric": 2.0}, ["uniaxial", "planar", "volumetric"], "for K is fitted to that curve alone"),
+        ({}, {"volumetric": 2.0}, ["uniaxial", "planar", "volumetric"], "as K is fitted to that curve alone"),
     ):
         with pytest.raises(InputError, match=sentence):
             refuse_idle(window, weights, modes=modes)
@@ -210,7 +210,7 @@ def test_a_curve_that_no_rubber_gives_is_refused(write_file):
         ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.02,0.1\n", "row 3: the volume ratio 0.02 .* volumetric_strain"),
         ("uniaxial", HEADER + "1.1,0.05\n1.2,0.09\n1.3,130\n1.4,160\n", "row 4: the stress jumps to 130 MPa.*are units mixed"),
         ("uniaxial", HEADER + "0.02,1.1\n0.1,1.3\n0.2,2\n", "row 2: the stress 1.1 MPa has the wrong sign.*are they swapped"),
-        ("uniaxial", HEADER + "0.9,0.1\n0.8,0.3\n", "say `compression: true` for a compression test written without a minus"),
+        ("uniaxial", HEADER + "0.9,0.1\n0.8,0.3\n", "write `compression: true` for a compression test written without a minus"),
         ("uniaxial", HEADER + "1.2,0.1\n1.2,0.3\n", "every row has the stretch 1.2; give a curve over a range"),
         ("uniaxial", "true_strain,nominal_stress_mpa\n0,0\n900,1\n", "row 3: the true strain 900 is beyond any elastomer"),
     ]:

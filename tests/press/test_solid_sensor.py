@@ -15,7 +15,7 @@ from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.press.kinds import solid_at_rest
-from softtact.press.objects import first_direction, way_to_touch
+from softtact.press.objects import distance_to_touch, first_direction
 from softtact.press.result import read_press
 
 RUBBER = make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=20)
@@ -76,11 +76,11 @@ def test_a_ball_touches_a_plane_and_an_edge_where_geometry_says():
     plane = trimesh.creation.box((10, 10, 1)).triangles
     ball = trimesh.creation.icosphere(4, 2.0).triangles
     down = np.array([0, 0, -1.0])
-    assert way_to_touch(ball + [0, 0, 9], plane, down) == pytest.approx(9 - 2 - 0.5, abs=5e-3)      # facets lie inside the ball
-    assert way_to_touch(ball, plane, down) == pytest.approx(-2.5, abs=5e-3)
-    assert way_to_touch(ball + [0, 0, -9], plane, -down) == pytest.approx(6.5, abs=5e-3)
-    assert way_to_touch(ball + [9, 0, 0], plane, np.array([-1.0, 0, 0])) == pytest.approx(9 - 5 - np.sqrt(4 - 0.25), abs=0.1)
-    assert way_to_touch(ball + [9, 0, 9], plane, down) == np.inf
+    assert distance_to_touch(ball + [0, 0, 9], plane, down) == pytest.approx(9 - 2 - 0.5, abs=5e-3)     # facets lie in the ball
+    assert distance_to_touch(ball, plane, down) == pytest.approx(-2.5, abs=5e-3)
+    assert distance_to_touch(ball + [0, 0, -9], plane, -down) == pytest.approx(6.5, abs=5e-3)
+    assert distance_to_touch(ball + [9, 0, 0], plane, np.array([-1.0, 0, 0])) == pytest.approx(9 - 5 - np.sqrt(4 - 0.25), abs=0.1)
+    assert distance_to_touch(ball + [9, 0, 9], plane, down) == np.inf
 
 
 @pytest.mark.parametrize(("steps", "direction"), [
@@ -185,7 +185,7 @@ def test_a_card_on_the_command_line_takes_the_place_of_a_regions_law(folder, cap
     ({"regions": {"rubber": {}}}, "'regions.rubber': it has no law"),
     ({"regions": {"rubber": {"law": "neo_hooke"}}}, "'regions.rubber': the law 'neo_hooke' has no parameters"),
     ({"regions": {"rubber": {"material": "neoprene", "card": "a.json"}}}, "a material and a card"),
-    ({"regions": {"rubber": {"material": "neoprene", "bulk_over_shear": 5}}}, "'bulk_over_shear' are of a law by itself"),
+    ({"regions": {"rubber": {"material": "neoprene", "bulk_over_shear": 5}}}, "'bulk_over_shear' belong to 'law'"),
     ({"held": {"bottom": "xyz"}}, "no face 'bottom'; its faces are"),
     ({"held": {}}, "field 'held' is not usable"),
     ({"contact": {"face": "skin"}}, "no face 'skin'"),

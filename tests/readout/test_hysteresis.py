@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softtact.readout.hysteresis import felt_branches, lagged, staircase
+from softtact.readout.hysteresis import delayed_branches, lagged, staircase
 
 TERMS = {"shares": (0.2, 0.1), "time_constants_s": (0.5, 10.0)}
 
@@ -76,7 +76,7 @@ def test_steps_of_force_take_no_time():
 def branches(**changes):
     """Felt deformation (3,) up and down where the press gives 1, 2 and 3."""
     rules = {"rate_n_per_s": 10.0, "hold_s": 1.0} | changes
-    return felt_branches(np.array([1.0, 2.0, 3.0]), staircase([10.0, 20.0, 30.0], **rules), **TERMS)
+    return delayed_branches(np.array([1.0, 2.0, 3.0]), staircase([10.0, 20.0, 30.0], **rules), **TERMS)
 
 
 def test_more_is_felt_on_the_way_down_than_on_the_way_up():

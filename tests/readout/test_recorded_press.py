@@ -24,7 +24,7 @@ def ramp(top_n=50.0, *, end_n=0.0, step_n=0.7):
 
 
 def recording(force_n, *, counts=None, finger=0):
-    """A recording of one finger whose counts are linear in the force, and higher on the way down."""
+    """A recording of one finger whose counts are linear in the force, and higher during unloading."""
     force = np.asarray(force_n)
     down = np.arange(len(force)) > np.argmax(force)
     read = force[:, None, None] * SLOPE + LOOP * down[:, None, None] if counts is None else counts
@@ -74,8 +74,8 @@ def test_what_is_no_single_press_from_touch_to_the_largest_force_is_refused():
             refusal(recording(ramp(42.0)), FORCES))
     assert "its force goes from 7 to 50 N and does not reach 5 N" in refusal(recording(ramp()[10:40].tolist() + [50.0]), FORCES)
     twice = np.r_[ramp(20.0), ramp()]
-    assert "press.csv, row 34: the force falls back on the way up (20 and 18.6 N)" in refusal(recording(twice), FORCES)
-    assert "the force rises again on the way down" in refusal(recording(np.r_[ramp(), ramp(20.0)]), FORCES)
+    assert "press.csv, row 34: the force falls back during loading (20 and 18.6 N)" in refusal(recording(twice), FORCES)
+    assert "the force rises again during unloading" in refusal(recording(np.r_[ramp(), ramp(20.0)]), FORCES)
     assert "it has no finger 2; give one of 0 to 1" in refusal(recording(ramp()), FORCES, finger=2)
 
 

@@ -76,7 +76,7 @@ def test_a_kept_baseline_is_told_by_the_lowest_readings(tmp_path):
 def test_a_recording_that_is_never_at_rest_must_state_its_baseline(tmp_path):
     path = tmp_path / "held.csv"
     write_recording(path, make_recording(TIME, COUNTS + 5000, source="x", baseline=BASE))
-    with pytest.raises(InputError, match="whether the baseline is taken off its readings is not clear.*--baseline"):
+    with pytest.raises(InputError, match="whether the baseline is subtracted from its readings is not clear.*--baseline"):
         read_recording(path)
     assert (read_recording(path, baseline="subtracted").counts.values == COUNTS + 5000).all()
 
@@ -93,7 +93,7 @@ def without(header, name):
     (lambda lines: [[*line, "S28_0" if k == 0 else 0] for k, line in enumerate(lines)], "finger 0 has 29 taxels (S28_0 is one too"),
     (lambda lines: [without(lines[0], "Gy1")(line) for line in lines], "the column 'Gy1' is missing beside 'Gx0'"),
     (lambda lines: [[*line, "Q" if k == 0 else 0] for k, line in enumerate(lines)], "the column 'Q' is none that the recorder"),
-    (lambda lines: lines[:1] + lines[2:], "row 2: it is no baseline, for D0_1 is 1"),
+    (lambda lines: lines[:1] + lines[2:], "row 2: it is no baseline, as D0_1 is 1"),
     (lambda lines: lines[:2] + [lines[4], lines[3]], "row 4: time runs back from 1032 to 1016 ms"),
     (lambda lines: lines[:2], "it has 1 row below its header"),
     (lambda lines: lines[:3] + [[*lines[3][:5], "7.5", *lines[3][6:]]] + lines[4:], "row 4: S2_0 is 7.5, which is no whole number"),
@@ -130,7 +130,7 @@ def test_a_finger_that_nothing_presses_has_no_dead_taxel():
 
 
 @pytest.mark.parametrize(("change", "sentence"), [
-    ({"counts": COUNTS + 0.5}, "the recording holds 0.5, and the recorder's format whole numbers"),
+    ({"counts": COUNTS + 0.5}, "the recording holds 0.5, but the recorder's format takes whole numbers"),
     ({"counts": COUNTS - 9001}, "come to -1, which 16 bits"),
     ({"counts": COUNTS[:, :1], "baseline": BASE[:1]}, "has (1, 7, 4) fingers, rows and columns"),
 ])

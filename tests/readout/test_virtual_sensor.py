@@ -204,7 +204,7 @@ def test_unusable_settings_are_refused_by_name():
         ({"nose_counts": 1}, "key 'nose_counts' is unknown; use one of electrode_spacing_mm"),
         ({"drift": -0.1}, "drift is -0.1; give one number of 0 or more"),
         ({"rate_n_per_s": 0}, "rate_n_per_s and largest_counts must be above 0"),
-        ({"coupling": 0.3}, "coupling is 0.3; four neighbours can take 0.25 each"),
+        ({"coupling": 0.3}, "coupling is 0.3; with four neighbours it is 0.25 at most"),
         ({"sheet_scatter": 0.4}, "sheet_scatter is 0.4; from 0.4 on a sheet could vanish"),
         ({"relaxation": 0.1}, "relaxation has 1 terms and relaxation_s 2; give as many"),
         ({"relaxation": [0.6, 0.4]}, "shares of 0 or more that sum to less than 1"),

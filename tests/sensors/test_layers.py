@@ -65,7 +65,7 @@ def test_a_wrong_file_is_refused_by_file_and_field(changes, said, tmp_path):
 
 
 def test_where_frusta_are_needed_a_sensor_without_is_refused():
-    with pytest.raises(InputError, match="at 'kind': 'layers' is not the kind that is needed here; give a sensor of kind frusta"):
+    with pytest.raises(InputError, match="at 'kind': 'layers' is not the required kind; give a sensor of kind frusta"):
         SensorSpec.from_yaml(sensor_file("sheet"))
     part = trimesh.creation.icosphere(radius=3.0)
     with pytest.raises(InputError, match="sheet has no frusta, which the foundation model needs; press with elastic or hyper"):

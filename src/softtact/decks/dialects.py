@@ -1,4 +1,4 @@
-"""The dialects of CalculiX (ccx 2.20) and Abaqus/Standard: what the two programs write differently.
+"""The dialects of CalculiX (ccx 2.20) and Abaqus/Standard: differences between their input files.
 
 CalculiX
 Elements   C3D20R. Its 2 x 2 x 2 points are those of our slab, and with them it locks as little as our projected pressure: eight
@@ -38,7 +38,7 @@ STIFF_MATERIAL = ("*MATERIAL, NAME=RIGID", "*ELASTIC", "1000, 0.3")     # of ele
 
 @dataclass(frozen=True)
 class Dialect:
-    """What a program takes, and the lines that it takes in a different form than the other one."""
+    """Types and lines of a deck that differ between the programs."""
 
     program: str
     """The program's name."""
@@ -51,15 +51,15 @@ class Dialect:
     wedge: str
     """Type of the wedges."""
     no_term: float
-    """D_i in 1/MPa that leaves a volumetric term of a law out; CalculiX would replace a zero by a default."""
+    """D_i in 1/MPa for a volumetric term that a law does not have; CalculiX replaces zero by a default."""
     hybrid: str
-    """What the type of a hybrid element, which has a pressure as an unknown, ends with; nothing where there is none."""
+    """Suffix of the type of hybrid elements, which have a pressure as an unknown; empty where there are none."""
     fields: tuple[str, ...]
     """Lines of a step that ask for displacements and stresses of all bodies."""
     contact_fields: tuple[str, ...]
-    """Lines of a step that ask for what contacts do."""
+    """Lines of a step that ask for results of contacts."""
     facets_are_rigid: bool
-    """Whether an object's facets are rigid as they are (Abaqus), or need elements behind them."""
+    """Whether an object's facets are rigid by themselves (Abaqus), or need elements behind them."""
 
     def contact(self, settings: Contact) -> list[str]:
         """*SURFACE BEHAVIOR of our penalty; in Abaqus pressure over overlap: a parabola up to the smoothing depth, then a line."""
@@ -78,7 +78,7 @@ class Dialect:
         return ["*FRICTION", f"{keywords.number(coefficient)}, {keywords.number(stick_slope)}"]
 
     def step(self, name: str, increments: str, *, first: bool) -> list[str]:
-        """A step's first lines, up to *BOUNDARY, which is given anew in each, so that a force can release a reference node."""
+        """A step's first lines, up to *BOUNDARY, which each step states in full, so that a force can release a reference node."""
         named = ([f"*STEP, NAME={name}, NLGEOM=YES, INC=1000"] if self.facets_are_rigid
                  else [f"** STEP: {name}", "*STEP, NLGEOM, INC=1000"])
         return [*named, "*STATIC", increments, "*BOUNDARY" if first else "*BOUNDARY, OP=NEW"]
@@ -110,7 +110,7 @@ DIALECTS = {
 
 
 def dialect_of(name: str) -> Dialect:
-    """The dialect of a name; InputError that lists them."""
+    """The dialect of a name. Raises InputError that lists the names."""
     if name not in DIALECTS:
         raise InputError(f"The format {name!r} is unknown; use one of {', '.join(DIALECTS)}.")
     return DIALECTS[name]

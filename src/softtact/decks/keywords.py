@@ -1,4 +1,4 @@
-"""What the decks of both programs share: keyword lines, rows of numbers, and laws.
+"""Common parts of the decks of both programs: keyword lines, rows of numbers, and laws.
 
 Laws: both programs split the energy as we do, psi of the isochoric stretches plus U(J), and take U = sum (J-1)^(2i) / D_i. Our
 quadratic U is K/2 (J-1)^2, so D_1 = 2/K and the further D_i stand for "no term". Only Arruda-Boyce differs there:
@@ -61,7 +61,7 @@ def number(value: float) -> str:
 
 
 def rows(values: Iterable[float], *, per_line: int = _PER_LINE) -> str:
-    """Numbers separated by commas, `per_line` a line; a line that goes on ends with a comma."""
+    """Numbers separated by commas, `per_line` a line; a continued line ends with a comma."""
     texts = [number(value) for value in values]
     lines = [", ".join(texts[k:k + per_line]) for k in range(0, len(texts), per_line)]
     return ",\n".join(lines)
@@ -79,18 +79,18 @@ def nodes(points: Iterable[np.ndarray], first: int, *, name: str | None = None) 
 
 
 def elements(kind: str, name: str, numbers: Iterable[int], connectivity: Iterable[np.ndarray]) -> list[str]:
-    """*ELEMENT with the elements' numbers (e,) and nodes (e, k), both as they stand in the deck."""
+    """*ELEMENT with the elements' numbers (e,) and nodes (e, k), both as numbered in the deck."""
     head = f"*ELEMENT, TYPE={kind}, ELSET={name}"
     return [head] + [rows([n, *row]) for n, row in zip(numbers, connectivity, strict=True)]
 
 
 def node_set(name: str, numbers: np.ndarray) -> list[str]:
-    """*NSET with the nodes' numbers as they stand in the deck."""
+    """*NSET with the nodes' numbers in the deck."""
     return [f"*NSET, NSET={name}", rows(numbers)] if len(numbers) else []
 
 
 def surface(name: str, faces: Iterable[Sequence[int]]) -> list[str]:
-    """*SURFACE of element faces (f, 2): element number as it stands in the deck, and face."""
+    """*SURFACE of element faces (f, 2): element number in the deck, and face."""
     return [f"*SURFACE, NAME={name}, TYPE=ELEMENT"] + [f"{element}, S{face}" for element, face in faces]
 
 

@@ -1,6 +1,6 @@
-"""A press as any finite-element program understands it: nodes, elements, laws, constraints, surfaces, contacts and steps.
+"""A press in the terms of any finite-element program: nodes, elements, laws, constraints, surfaces, contacts and steps.
 
-Nothing here is written in a program's dialect. Numbers count from 0; the writers add 1. Lengths in mm, forces in N, stresses
+It does not depend on a program's dialect. Numbers count from 0; the writers add 1. Lengths in mm, forces in N, stresses
 in MPa. The mesh has 20-node bricks and 15-node wedges: our 27-node bricks and 18-node wedges have nodes in the middle of faces and
 bodies, too. Without these the element has the same shape, for its sides are curves through three nodes and its faces are spanned
 by them.
@@ -26,8 +26,8 @@ from softtact.models.hyperelastic.frusta import DIRECTIONS
 _NO_WEIGHT = 1e-10
 # Numbers of a brick's and a wedge's faces in Abaqus and CalculiX alike, S1 to S6: those of `Element.faces`, counted from 1.
 BOTTOM, TOP, FIRST_SIDE = 1, 2, 3
-TOUCH_MM = 0.01                   # overlap of object and cover after the first step: a force alone holds no free object
-SLIVER_MM = 0.01                  # narrower facets are left out: the contact search of CalculiX does not end on them
+TOUCH_MM = 0.01                   # overlap of object and cover after the first step, as a free object under a force needs contact
+SLIVER_MM = 0.01                  # narrower facets are left out, as CalculiX's contact search does not end with them
 _BOARD_MARGIN_MM = 1.0
 
 
@@ -70,7 +70,7 @@ class Tie:
 class BodyMesh:
     """points (n, 3) in mm; parts SHEET, COVER where there is one, FRUSTA; ties of nodes that follow others.
 
-    slab (s,), frusta (f, nodes): the number here of each node of the slab and of each frustum, -1 where it is left out.
+    slab (s,), frusta (f, nodes): number in `points` of each node of the slab and of each frustum, -1 where it is left out.
     """
 
     points: np.ndarray
@@ -87,16 +87,16 @@ def body_mesh(body: LayeredBody) -> BodyMesh:
     cover, hanging = _cover_numbers(slab)
     sheet, followers = _sheet_numbers(slab, slab.nodes + len(hanging))
     first = slab.nodes + len(hanging) + len(followers)
-    own = first + np.arange(support.count * support.nodes).reshape(support.count, support.nodes)
-    own[:, support.root] = body.cells.roots
+    frusta = first + np.arange(support.count * support.nodes).reshape(support.count, support.nodes)
+    frusta[:, support.root] = body.cells.roots
     points = np.vstack([slab.points, slab.cover_mesh.points[hanging], slab.sheet_mesh.points[followers],
                         support.coordinates.reshape(-1, 3)])
     ties = _ties(slab.nodes, hanging, *slab.cover_mesh.masters())
     ties += _ties(slab.nodes + len(hanging), followers, slab.sheet_nodes.masters, slab.sheet_nodes.weights)
     number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], cover,
-                              own[:, _hexes(support.mesh)], *(tie.masters for tie in ties)], len(points))
+                              frusta[:, _hexes(support.mesh)], *(tie.masters for tie in ties)], len(points))
     ties = [Tie(int(number[tie.slave]), number[tie.masters], tie.weights) for tie in ties if number[tie.slave] >= 0]
-    frusta = number[own]
+    frusta = number[frusta]
     return BodyMesh(points[number >= 0], _parts(body, number[sheet], number[cover], frusta), ties, number[:slab.nodes], frusta)
 
 
@@ -109,16 +109,16 @@ def _wedges(mesh):
 
 
 def _cover_numbers(slab):
-    """Nodes of the cover's hexahedra (e, 20), and which of its points follow others: those are numbered after the slab's own."""
+    """Nodes of the cover's hexahedra (e, 20), and its points that follow others, which are numbered after the slab's nodes."""
     mesh = slab.cover_mesh
     hexes = np.where(mesh.hexes < mesh.free, mesh.hexes, slab.nodes + mesh.hexes - mesh.free)
     return hexes, np.arange(mesh.free, len(mesh.points))
 
 
 def _sheet_numbers(slab, first_follower):
-    """Number of each node of the sheet's mesh, and which of them follow others, numbered from `first_follower` on.
+    """Number of each node of the sheet's mesh, and those that follow others, numbered from `first_follower` on.
 
-    A node that follows one other with weight 1 is that one.
+    A node that follows a single node with weight 1 is identified with it.
     """
     masters, weights = slab.sheet_nodes.masters, slab.sheet_nodes.weights
     first = np.argmax(weights, axis=1)
@@ -130,7 +130,7 @@ def _sheet_numbers(slab, first_follower):
 
 
 def _ties(first, followers, masters, weights):
-    """What followers, numbered from `first` on, follow: larger elements of the cover; its lower side; curves along coarse walls."""
+    """`Tie`s of followers, numbered from `first` on: to larger elements of the cover, its lower side, or constrained cell edges."""
     used = np.abs(weights) > _NO_WEIGHT
     return [Tie(first + k, masters[node, used[node]], weights[node, used[node]]) for k, node in enumerate(followers)]
 
@@ -198,7 +198,7 @@ class DeckModel:
     """A press: points (n, 3) of the rubber, `held` (h, 2) pairs of node and component 0..2, named node sets and surfaces.
 
     surfaces: {name: (f, 2) element and face number S1..S6}
-    remarks: sentences that every deck carries as comments
+    remarks: comments of every deck
     """
 
     title: str
@@ -219,8 +219,8 @@ def deck_model(body: LayeredBody, placed: trimesh.Trimesh, *, forces_n: Sequence
                touch_mm: float = TOUCH_MM) -> DeckModel:
     """The press of a placed mesh (trimesh, mm) on a `LayeredBody` as a `DeckModel`.
 
-    Either `forces_n` (N, increasing), after a first step that lowers the object until it overlaps by `touch_mm`, or
-    `indentations_mm` (increasing), which the object follows.
+    Either `forces_n` (N, increasing), after a first step that lowers the object to an overlap of `touch_mm`, or
+    `indentations_mm` (increasing), which are prescribed.
     """
     surface, mesh = HeightField(placed), body_mesh(body)
     support: Any = body.support     # a `FrustumArray`: decks are of sensors with frusta
@@ -249,7 +249,7 @@ def _node_sets(body, mesh, held):
 
 
 def _held(body, mesh):
-    """Pairs (node, component) that do not move: the slab's sides as it has them, and held tips."""
+    """Pairs (node, component) that do not move: of the slab's held sides, and of held tips."""
     slab = np.ones(3 * body.slab.nodes, dtype=bool)
     slab[body.slab.free] = False
     node, component = np.divmod(np.flatnonzero(slab), 3)
@@ -293,20 +293,20 @@ def _faces(elements, face):
 
 
 def _odd(centres):
-    """Which frusta are the black squares of the chessboard (f,): every neighbour of a black one is white."""
+    """Whether frusta (f,) are the black squares of a chessboard pattern: the neighbours of a black one are white."""
     index = [np.unique(np.round(axis, 6), return_inverse=True)[1].ravel() for axis in centres.T]
     return (index[0] + index[1]) % 2 == 1
 
 
 def _object(body, surface):
-    """The object's facets that look down, lie over the slab and are as near as the sensor is thick, slivers left out."""
+    """The object's facets that face down, lie over the slab and within the sensor's thickness of the lowest, without slivers."""
     lowest = surface.triangles[..., 2].min(axis=1) if len(surface.triangles) else np.zeros(0)
     footprint = [2 * max(abs(lines[0]), abs(lines[-1])) for lines in (body.slab.x_lines, body.slab.y_lines)]
     reach = -body.support.coordinates[..., 2].min()
     near = facets_over(surface.triangles, footprint) & (lowest <= lowest.min(initial=np.inf) + reach)
     near &= _widths(surface.triangles) > SLIVER_MM
     if not near.any():
-        raise InputError("The object misses the sensor: none of its facets that look down lies over it; correct its pose.")
+        raise InputError("The object misses the sensor: none of its facets that face down lies over it; correct its pose.")
     points, facets = np.unique(surface.triangles[near].reshape(-1, 3), axis=0, return_inverse=True)
     return RigidSurface("OBJECT", points, facets.reshape(-1, 3), moves=True)
 
@@ -336,7 +336,7 @@ def _contacts(body):
 
 
 def _walls(body):
-    """Planes of symmetry towards neighbours that are not modelled (the unit cell); None where all of them are."""
+    """Planes of symmetry towards neighbours that are not modelled (unit cell); None where all are modelled."""
     support = body.support
     if support.count > 1 or not support.geometry.neighbours.any():
         return None
@@ -351,7 +351,7 @@ def _walls(body):
         corners[:, axis] = support.geometry.centres[0, axis] + sign * half
         corners[:, 1 - axis] = support.geometry.centres[0, 1 - axis] + reach * np.array([-1, -1, 1, 1])
         corners[:, 2] = [bottom, top, top, bottom]
-        if np.cross(corners[1] - corners[0], corners[2] - corners[0])[axis] * sign > 0:   # the normal looks at the frustum
+        if np.cross(corners[1] - corners[0], corners[2] - corners[0])[axis] * sign > 0:   # the normal points at the frustum
             corners = corners[::-1]
         facets += (4 * len(points) + np.array([[0, 1, 2], [0, 2, 3]])).tolist()
         points.append(corners)

@@ -3,8 +3,8 @@
     export_press(sensor, mesh, force_n=[5, 20], dialect="calculix", path="press.inp")
     write_deck("cell.inp", deck_model(body, placed, forces_n=[0.1]), dialect="abaqus")
 
-The object moves along z only. Friction is written where the sensor has it: in CalculiX its stick slope is such that a point slides
-off after our slip tolerance at 1 MPa, earlier at less. Each step repeats what is held, so that a force can release the object.
+The object moves along z only. Friction is written where the sensor has it: CalculiX's stick slope lets a point slide after our slip
+tolerance at 1 MPa, earlier at less. Each step repeats the held nodes, so that a force can release the object.
 """
 
 from collections.abc import Sequence
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 CONTROLS = ("force", "indentation")
-_INCREMENTS = f"{0.1}, 1, {1e-6}, {0.25}"     # of a step: the first, all, the smallest, the largest
-_STICK_PRESSURE_MPA = 1.0                     # at which friction in CalculiX is as stiff as ours
+_INCREMENTS = f"{0.1}, 1, {1e-6}, {0.25}"     # of a step: the first, the whole, the smallest, the largest
+_STICK_PRESSURE_MPA = 1.0                     # pressure at which friction in CalculiX is as stiff as ours
 _TABLES = {"calculix": ("*NODE PRINT, NSET=OBJECT_REFERENCE, FREQUENCY=1000", "U",
                         "*NODE PRINT, NSET=OBJECT_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
                         "*NODE PRINT, NSET=BOARD_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
@@ -76,7 +76,7 @@ def _rubber(model: DeckModel, kinds: dict[str, str], writer: Dialect) -> list[st
 
 
 def _rigid_bodies(model: DeckModel, writer: Dialect) -> tuple[list[str], int | None, list[str]]:
-    """Lines of the rigid bodies, the number of the moving one's reference node, and *BOUNDARY rows of what does not move."""
+    """Lines of the rigid bodies, the number of the moving one's reference node, and *BOUNDARY rows of fixed nodes."""
     lines: list[str] = [] if writer.facets_are_rigid else list(STIFF_MATERIAL)
     fixed: list[str] = []
     moving, node, element = None, len(model.points) + 1, sum(len(part.elements) for part in model.parts) + 1
@@ -93,7 +93,7 @@ def _rigid_bodies(model: DeckModel, writer: Dialect) -> tuple[list[str], int | N
 
 
 def _rigid_body(body: RigidSurface, node: int, element: int, writer: Dialect) -> tuple[list[str], int, int]:
-    """Lines of a rigid body whose nodes and elements are numbered from `node` and `element`, its reference node, its nodes."""
+    """Lines of a rigid body whose nodes and elements are numbered from `node` and `element`, its reference node, its node count."""
     points, facets = (body.points, body.facets) if writer.facets_are_rigid else tetrahedra_behind(body.points, body.facets)
     numbers, reference = np.arange(element, element + len(facets)), node + len(points)
     lines = keywords.nodes(points, node, name=f"{body.name}_NODES")
@@ -119,7 +119,7 @@ def _contacts(model: DeckModel, writer: Dialect) -> list[str]:
 
 
 def _drive(step: ObjectStep, reference: int | None) -> list[str]:
-    """What moves or loads the object's reference node in a step."""
+    """Lines that move or load the object's reference node in a step."""
     value = keywords.number(-step.value)
     return [f"{reference}, 3, 3, {value}"] if step.control == "indentation" else ["*CLOAD", f"{reference}, 3, {value}"]
 
@@ -135,8 +135,8 @@ def export_press(sensor: "Sensor", mesh: trimesh.Trimesh, *, force_n: float | Se
                  pose: Pose | None = None, control: str = "force", name: str = "object", **elements: str) -> DeckModel:
     """Write the hyperelastic press of a mesh (trimesh, mm) on a `Sensor` as a deck, and return its `DeckModel`.
 
-    force_n: N, one or an increasing list. control: "force" pushes with these forces; "indentation" lets the object follow the
-    indentations that our solution has at them, which is solved first, and leaves the forces to be compared.
+    force_n: N, one or an increasing list. control: "force" loads with these forces; "indentation" prescribes the indentations of
+    our solution at these forces, which is solved first, so that the forces can be compared.
     """
     if control not in CONTROLS:
         raise InputError(f"The control {control!r} is unknown; use one of {', '.join(CONTROLS)}.")

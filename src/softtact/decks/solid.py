@@ -2,13 +2,14 @@
 
     export_solid("press.inp", body, {"ball": Motion().step(ways={"z": -0.2})}, dialect="calculix")
 
-Elements   CalculiX: C3D10, C3D20R, C3D15, CPE8R, CAX8R, CPE6, CAX6, as they are. Abaqus: the same with a pressure in each element
-           (H), but for foams. Nodes in faces and bodies of our full quadratic elements are left out.
+Elements   CalculiX: C3D10, C3D20R, C3D15, CPE8R, CAX8R, CPE6, CAX6. Abaqus: the same with a pressure in each element
+           (H), except for foams. Nodes in faces and bodies of our full quadratic elements are left out.
 Frames     move without turning: every node that a frame carries follows its reference node by *EQUATION, so that a displacement or
            a force of the reference node drives it. A frame that turns is refused.
-Contact    surface to surface, linear penalty: `STIFFER` times that of the pair, because neither augments it as we do. Sticking
+Contact    surface to surface, linear penalty: `STIFFER` times that of the pair, because neither program augments it as we do.
+Sticking
            friction is as stiff (CalculiX), or slips elastically by 1 um (Abaqus).
-Steps      those of the motions. A rigid object that is loaded first is moved to touch in a step before.
+Steps      those of the motions. A rigid object whose first step is a force is moved to touch in a step before.
 """
 
 import re
@@ -38,10 +39,10 @@ _INCREMENTS = "0.1, 1, 1e-6, 0.25"
 
 @dataclass(frozen=True)
 class DeckStep:
-    """A step: what is prescribed {(frame, axis): mm from rest} and loaded {(frame, axis): N}, and the faces' pressures in MPa."""
+    """A step: displacements {(frame, axis): mm from rest}, loads {(frame, axis): N}, and the faces' pressures in MPa."""
 
     name: str
-    ways: dict[tuple[int, int], float]
+    displacements: dict[tuple[int, int], float]
     loads: dict[tuple[int, int], float]
     pressures: list[float]
 
@@ -50,8 +51,8 @@ def export_solid(path: str | Path, body: SolidBody, motions: Mapping[str, Motion
                  pressures: Mapping[str, Sequence[float]] | None = None, *, dialect: str, title: str = "press of solids") -> None:
     """Write a press of solids as a deck, whole or not at all; arguments as `SolidPath` takes them.
 
-    Raises InputError where the deck cannot say it: an unknown dialect, a law that the program lacks, a frame that turns, a freedom
-    that is held after it was loaded, self-contact in CalculiX.
+    Raises InputError for what a deck cannot express: an unknown dialect, a law that the program lacks, a frame that turns, a
+    freedom that is held after it was loaded, self-contact in CalculiX.
     """
     lines = _Deck(body, dialect_of(dialect)).lines(deck_steps(body, motions or {}, pressures or {}), title)
     with atomic_path(path) as temporary:
@@ -66,7 +67,7 @@ def deck_steps(body: SolidBody, motions: Mapping[str, Motion], pressures: Mappin
         raise InputError(f"There is no frame {unknown[0]!r}; there are {', '.join(names) or 'none'}.")
     if len(counts) != 1:
         raise InputError(f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many.")
-    ways = {(k, axis): 0.0 for k in range(len(names)) for axis in range(3)}
+    displacements = {(k, axis): 0.0 for k in range(len(names)) for axis in range(3)}
     released: set[tuple[int, int]] = set()
     out = []
     for number in range(counts.pop()):
@@ -75,17 +76,18 @@ def deck_steps(body: SolidBody, motions: Mapping[str, Motion], pressures: Mappin
             step = motions[name].steps[number] if name in motions else MotionStep()
             _refuse_turning(name, number, step)
             loads |= {(k, FREEDOMS.index(freedom)): value for freedom, value in step.loads.items()}
-            for freedom, way in step.ways.items():
-                ways[k, FREEDOMS.index(freedom)] += way
+            for freedom, value in step.ways.items():
+                displacements[k, FREEDOMS.index(freedom)] += value
         if held := released - loads.keys():
             frame, axis = next(iter(held))
-            raise InputError(f"The frame {names[frame]!r} is held along {FREEDOMS[axis]} in step {number + 1}, where the force "
-                             "before left it; a deck cannot know that place: leave that step out, or go on loading it.")
+            raise InputError(f"The frame {names[frame]!r} is held along {FREEDOMS[axis]} in step {number + 1} at the position to "
+                             "which the force before moved it, unknown to a deck; leave that step out, or continue to load it.")
         released = set(loads)
         if number == 0 and (touch := _touch(body, loads)):
-            out.append(DeckStep("TOUCH", ways | touch, {}, [0.0] * len(body.pressures)))
+            out.append(DeckStep("TOUCH", displacements | touch, {}, [0.0] * len(body.pressures)))
         values = [float(pressures[face.name][number]) if face.name in pressures else 0.0 for face in body.pressures]
-        out.append(DeckStep(f"STEP_{number + 1}", {key: way for key, way in ways.items() if key not in loads}, loads, values))
+        free = {key: value for key, value in displacements.items() if key not in loads}
+        out.append(DeckStep(f"STEP_{number + 1}", free, loads, values))
     return out
 
 
@@ -96,15 +98,15 @@ def _refuse_turning(name, number, step):
 
 
 def _touch(body, loads):
-    """Ways {(frame, axis): mm} that bring a rigid object to touch along the one force that acts on it."""
+    """Displacements {(frame, axis): mm} that bring a rigid object to touch along the one force that acts on it."""
     first = len(body.mesh.points)
     rigid = {key: value for key, value in loads.items() if body.frames[key[0]].nodes.min() >= first and value}
     if not rigid:
         return {}
     gap = min((float(np.min(contact.projection.gap, initial=np.inf)) for contact in body.rest().contacts), default=np.inf)
     if len(rigid) > 1 or not np.isfinite(gap):
-        raise InputError("A deck brings one loaded object to touch, along one axis, from within its pair's reach; place it "
-                         "nearer, or prescribe its displacement in a step before.")
+        raise InputError("A deck moves only one loaded object to touch, along one axis, within its pair's reach; place it "
+                         "closer, or prescribe its displacement in a step before.")
     key, value = next(iter(rigid.items()))
     return {key: float(np.sign(value)) * (max(gap, 0.0) + _TOUCH_MM)}
 
@@ -160,20 +162,20 @@ class _Deck:
         return np.setdiff1d(held, np.concatenate([np.zeros(0, dtype=int), *carried]))
 
     def _frames(self):
-        """Reference nodes, rigid objects, and what follows whom."""
+        """Reference nodes, rigid objects, and the nodes that follow the reference nodes."""
         lines, taken = [], np.zeros((len(self.body.points), 3), dtype=bool)
         axes = range(3 if self.body.mesh.geometry == "solid" else 2)
-        for k, frame in reversed(list(enumerate(self.body.frames))):     # a node that two carry follows the last
-            name, own = name_of(frame.name), frame.nodes
+        for k, frame in reversed(list(enumerate(self.body.frames))):     # a node that two frames carry follows the last
+            name, nodes = name_of(frame.name), frame.nodes
             lines += keywords.nodes([frame.point], self.reference[k], name=f"{name}_REFERENCE")
-            if own.min() >= self.soft:
-                own = np.concatenate([own, self._object(frame, lines)])
+            if nodes.min() >= self.soft:
+                nodes = np.concatenate([nodes, self._object(frame, lines)])
             else:
-                own = np.intersect1d(own, self.used)
-            lines += keywords.node_set(f"{name}_NODES", own + 1)
+                nodes = np.intersect1d(nodes, self.used)
+            lines += keywords.node_set(f"{name}_NODES", nodes + 1)
             for axis in axes:
-                if "xyz"[axis] in frame.axes and (not self.writer.facets_are_rigid or own.min() < self.soft):
-                    new = own[(own >= len(taken)) | ~taken[np.minimum(own, len(taken) - 1), axis]]
+                if "xyz"[axis] in frame.axes and (not self.writer.facets_are_rigid or nodes.min() < self.soft):
+                    new = nodes[(nodes >= len(taken)) | ~taken[np.minimum(nodes, len(taken) - 1), axis]]
                     lines += keywords.moving_along(new + 1, self.reference[k], axis + 1)
                     taken[new[new < len(taken)], axis] = True
         return lines
@@ -197,15 +199,15 @@ class _Deck:
         return behind
 
     def _facing(self, facets):
-        """The facets (t, 3) of an object that face a surface which meets it: the search of CalculiX also finds those behind."""
-        own = _normals(self.body.points, facets)
+        """The facets (t, 3) of an object that face its partner surface: the search of CalculiX also finds those behind."""
+        outward = _normals(self.body.points, facets)
         surfaces = [pair.surface for pair in self.body.pairs if np.isin(pair.other.nodes[0, :3], facets).all()]
         met = [np.unique(_normals(self.body.points, surface.nodes[:, :3]).round(3), axis=0) for surface in surfaces]
         if not met:
             return facets
-        faces = np.any([(own @ normals.T).min(axis=1) < _FACING for normals in met], axis=0)
+        faces = np.any([(outward @ normals.T).min(axis=1) < _FACING for normals in met], axis=0)
         if not faces.any():
-            raise InputError("A rigid object turns its back on the surface that it is to meet; turn its facets' normals outwards.")
+            raise InputError("A rigid object's facets face away from the surface of their pair; turn their normals outwards.")
         return facets[faces]
 
     def _contacts(self):
@@ -228,7 +230,7 @@ class _Deck:
         return lines
 
     def _object_of(self, surface: Surface) -> str | None:
-        """Name of the rigid object's surface that this one is, None where it is soft."""
+        """Name of a rigid object's surface, None for a soft one."""
         node = int(surface.nodes[0, 0])
         frames = (frame for frame in self.body.frames if node >= self.soft and node in frame.nodes)
         return next((f"{name_of(frame.name)}_SURFACE" for frame in frames), None)
@@ -241,7 +243,7 @@ class _Deck:
                     rows = np.sort(nodes[:, face.nodes[:face.element.corners]], axis=1)
                     self._sides |= {tuple(row): (number, side) for row, number in zip(rows.tolist(), numbers.tolist(), strict=True)}
         count = np.where(surface.kinds >= LINE2, 2, np.where(surface.kinds >= QUAD8, 4, 3))
-        keys = [tuple(sorted(own[:k])) for own, k in zip(surface.nodes.tolist(), count, strict=True)]
+        keys = [tuple(sorted(nodes[:k])) for nodes, k in zip(surface.nodes.tolist(), count, strict=True)]
         if missing := [key for key in keys if key not in self._sides]:
             raise InputError(f"A facet of a surface belongs to no element of the deck (nodes {missing[0]}); name mesh faces.")
         return [self._sides[key] for key in keys]
@@ -250,9 +252,9 @@ class _Deck:
         lines = self.writer.step(step.name, _INCREMENTS, first=first)
         lines += [f"HELD_{axis + 1}, {axis + 1}, {axis + 1}" for axis in range(3) if len(self._held(axis))]
         plane = self.body.mesh.geometry != "solid"
-        for (frame, axis), way in step.ways.items():
+        for (frame, axis), value in step.displacements.items():
             if not (plane and axis == 2):
-                lines += [f"{self.reference[frame]}, {axis + 1}, {axis + 1}, {keywords.number(way)}"]
+                lines += [f"{self.reference[frame]}, {axis + 1}, {axis + 1}, {keywords.number(value)}"]
         if self.writer.facets_are_rigid:
             lines += [f"{self.reference[k]}, 4, 6" for k, frame in enumerate(self.body.frames) if frame.nodes.min() >= self.soft]
         if step.loads:
@@ -280,6 +282,6 @@ def _normals(points, facets):
 
 
 def name_of(name: str) -> str:
-    """A name as decks take it: capitals, digits and underscores, a letter first."""
+    """A name in the form of decks: capitals, digits and underscores, a letter first."""
     text = re.sub(r"\W", "_", name.upper(), flags=re.ASCII)
     return text if text[:1].isalpha() else f"N{text}"

@@ -197,7 +197,7 @@ def _at_height(plane, zeta):
 
 
 def _faces(element, nodes):
-    return tuple(Face(element, np.array(own)) for own in nodes)
+    return tuple(Face(element, np.array(numbers)) for numbers in nodes)
 
 
 _LINE3_NODES = np.array([[-1.0], [1.0], [0.0]])

@@ -88,7 +88,7 @@ def cover_mesh(x_lines: np.ndarray, y_lines: np.ndarray, heights: np.ndarray, sp
     cells = [_leaves(layer, most) for layer in splits]
     low = np.vstack([np.column_stack([leaf[:, :2], np.full(len(leaf), 2 * k)]) for k, leaf in enumerate(cells)])
     size = np.concatenate([leaf[:, 2] for leaf in cells])
-    # Whole numbers stand for places: 2 in x and y for the side of the smallest cell, 2 in z for a layer.
+    # Places are whole numbers: 2 in x and y for the side of the smallest cell, 2 in z for a layer.
     half = np.column_stack([size, size, np.ones_like(size)])
     nodes = low[:, None] + ((HEX20.nodes[None] + 1) * half[:, None]).astype(np.int64)
     places, hexes = np.unique(nodes.reshape(-1, 3), axis=0, return_inverse=True)

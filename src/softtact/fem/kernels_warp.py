@@ -229,9 +229,9 @@ class WarpKernels:
         for start in range(0, len(deformed.J), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
             points = slice(start * g, (start + _AT_ONCE) * g)
-            own = Deformation(deformed.F[part], deformed.C[points], deformed.J[part])
-            K = self._tangents(own, at_rest._replace(shapes=at_rest.shapes[part]), stress[points], moduli[points], volume.of(part),
-                               upper=True)
+            deformed_part = Deformation(deformed.F[part], deformed.C[points], deformed.J[part])
+            K = self._tangents(deformed_part, at_rest._replace(shapes=at_rest.shapes[part]), stress[points], moduli[points],
+                               volume.of(part), upper=True)
             self._launch(_scatter, K.shape[:2], K, there, start, total)
         values += total.numpy()
 

@@ -57,15 +57,15 @@ def _all_facets(mesh):
     kinds = dict.fromkeys(kind for face in mesh.faces.values() for kind in face)
     facets, place = {}, {}
     for kind in kinds:
-        own = np.concatenate([face[kind] for face in mesh.faces.values() if kind in face])
-        facets[kind] = np.unique(own, axis=0)
+        repeated = np.concatenate([face[kind] for face in mesh.faces.values() if kind in face])
+        facets[kind] = np.unique(repeated, axis=0)
         place[kind] = {tuple(row): k for k, row in enumerate(facets[kind].tolist())}
     flags = {}
     for name, face in mesh.faces.items():
         flags[name] = {}
-        for kind, own in face.items():
+        for kind, nodes in face.items():
             flags[name][kind] = np.zeros(len(facets[kind]), np.int8)
-            flags[name][kind][[place[kind][tuple(row)] for row in own.tolist()]] = 1
+            flags[name][kind][[place[kind][tuple(row)] for row in nodes.tolist()]] = 1
     return facets, flags
 
 
@@ -83,8 +83,8 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
     """
     path = Path(path)
     read = _read(path)
-    own = any(name.startswith(_REGION) for name in read.cell_data)
-    if unit is not None and unit not in UNIT_MM or unit is None and not own:
+    of_softtact = any(name.startswith(_REGION) for name in read.cell_data)
+    if unit is not None and unit not in UNIT_MM or unit is None and not of_softtact:
         stated = "no unit is stated, and the file has none" if unit is None else f"the unit {unit!r} is not known"
         raise InputError(f"{path}: {stated}; state one of {', '.join(UNIT_MM)}.")
     dimensions = [_dimension(block.type) for block in read.cells]
@@ -101,7 +101,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
                    for k, (_, nodes) in zip(elements, cells, strict=True)]
     points, cells, number = _quadratic(path, points, cells)
     kind, thickness = _geometry(path, read, geometry, thickness_mm, d, points)
-    parts = tuple((name, own, nodes[region == name]) for (own, nodes), region in zip(cells, of_elements, strict=True)
+    parts = tuple((name, type_, nodes[region == name]) for (type_, nodes), region in zip(cells, of_elements, strict=True)
                   for name in dict.fromkeys(region))
     mesh = SolidMesh(points, parts, geometry=kind, thickness_mm=thickness)
     _refuse_inverted(path, mesh)
@@ -140,11 +140,11 @@ def _sets(read) -> dict[str, list[np.ndarray]]:
             found[name.partition(":")[2]] = [np.asarray(values).ravel() > 0 for values in arrays]
     for name, members in read.cell_sets.items():
         if not name.startswith(_EMPTY):
-            found[name] = [_flags(own, count) for own, count in zip(members, lengths, strict=True)]
+            found[name] = [_flags(numbers, count) for numbers, count in zip(members, lengths, strict=True)]
     tags = read.cell_data.get("gmsh:physical")
     for name, (tag, dimension) in (read.field_data.items() if tags else ()):
-        found[name] = [(np.asarray(own) == tag) & (_dimension(block.type) == dimension)
-                       for own, block in zip(tags, read.cells, strict=True)]
+        found[name] = [(np.asarray(values) == tag) & (_dimension(block.type) == dimension)
+                       for values, block in zip(tags, read.cells, strict=True)]
     return found
 
 
@@ -191,7 +191,7 @@ def _quadratic(path, points, cells):
                          f"all quadratic ones of {', '.join([*QUADRATIC, *ELEMENTS])}.")
     turned = [(kind, _upright(points, nodes) if kind == "wedge" else nodes) for kind, nodes in cells]
     new, nodes, number = raised(points, turned)
-    return new, [(QUADRATIC[kind].meshio_name, own) for (kind, _), own in zip(turned, nodes, strict=True)], number
+    return new, [(QUADRATIC[kind].meshio_name, one) for (kind, _), one in zip(turned, nodes, strict=True)], number
 
 
 def _upright(points, wedges):
@@ -206,14 +206,14 @@ def _geometry(path, read, geometry, thickness_mm, d, points) -> tuple[str, float
                             if name.startswith(_GEOMETRY)}
     if stated:
         kind, arrays = next(iter(stated.items()))
-        return kind, float(np.concatenate([np.ravel(own) for own in arrays])[0])
+        return kind, float(np.concatenate([np.ravel(values) for values in arrays])[0])
     if d == 3:
         return "solid", 1.0
     if np.ptp(points[:, 2]) > 0:
         raise InputError(f"{path}: it holds a surface in space and no solid elements; mesh the body inside it, for example with "
                          "`softtact mesh`.")
     if geometry not in ("plane_strain", "axisymmetric"):
-        raise InputError(f"{path}: it is a plane mesh; say whether its geometry is plane_strain or axisymmetric.")
+        raise InputError(f"{path}: it is a plane mesh; state its geometry, plane_strain or axisymmetric.")
     return geometry, thickness_mm
 
 
@@ -233,7 +233,7 @@ def _refuse_inverted(path, mesh):
 
 def _face(path, mesh, name, corners):
     """The facets of the mesh's boundary that have these corners [(f, k)]."""
-    wanted = {tuple(sorted(row)) for own in corners for row in own.tolist()}
+    wanted = {tuple(sorted(row)) for block in corners for row in block.tolist()}
     found, known = {}, set()
     for kind, nodes in mesh.boundary.items():
         keys = [tuple(sorted(row)) for row in nodes[:, :_FACET_CORNERS[kind]].tolist()]

@@ -18,8 +18,8 @@ def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple
     A new node is at the mean of the corners of its edge, face or element.
     """
     members = [_members(kind) for kind, _ in cells]
-    width = max(int(own.sum(axis=1).max()) for own in members)
-    keys = [_keys(corners, own, width) for (_, corners), own in zip(cells, members, strict=True)]
+    width = max(int(mask.sum(axis=1).max()) for mask in members)
+    keys = [_keys(corners, mask, width) for (_, corners), mask in zip(cells, members, strict=True)]
     between, place = np.unique(np.concatenate([key.reshape(-1, width) for key in keys]), axis=0, return_inverse=True)
     there = between >= 0
     new = np.where(there[..., None], points[between], 0.0).sum(axis=1) / there.sum(axis=1)[:, None]
@@ -51,9 +51,9 @@ def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -
         first = first[~known[new]]     # each node once, also if several elements share it
         known[new] = True
         at, member = members.shape[0], members[first % members.shape[0]]
-        own = corners[first // at]
+        element_corners = corners[first // at]
         rows.append(np.repeat(nodes.ravel()[first], member.sum(axis=1)))
-        columns.append(own[member])
+        columns.append(element_corners[member])
         values.append((member / member.sum(axis=1, keepdims=True))[member])
     return sp.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
 

@@ -252,8 +252,8 @@ def hanging_node_constraints(masters: np.ndarray, weights: np.ndarray, elements:
     at_rest = block.at_rest
     table = np.hstack([at_rest.shapes[:, None], follow.reshape(len(follow), -1)])
     first, shapes = unique_rows(table)
-    own = table[first, 0].astype(int)
-    gradients = np.ascontiguousarray(np.einsum("egdm,emw->egdw", at_rest.gradients[own], follow[first], optimize=True))
-    block.at_rest = at_rest._replace(gradients=gradients, volumes=at_rest.volumes[own], shapes=shapes,
-                                     gram_inverse=at_rest.gram_inverse[own])
+    shape = table[first, 0].astype(int)
+    gradients = np.ascontiguousarray(np.einsum("egdm,emw->egdw", at_rest.gradients[shape], follow[first], optimize=True))
+    block.at_rest = at_rest._replace(gradients=gradients, volumes=at_rest.volumes[shape], shapes=shapes,
+                                     gram_inverse=at_rest.gram_inverse[shape])
     return nodes, block

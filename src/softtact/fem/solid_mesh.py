@@ -146,11 +146,11 @@ def _boundary(cells):
     kinds: dict[str, list[np.ndarray]] = {}
     for element, nodes in cells:
         for number, face in enumerate(element.faces):
-            own = nodes[:, face.nodes]
+            facet = nodes[:, face.nodes]
             if number == 0 and element.nodes.shape[1] == 3:  # a bottom is seen from inside
-                own = own[:, _FLIPPED[own.shape[1]]]
-            kinds.setdefault(face.element.meshio_name, []).append(own)
-    facets = {kind: np.concatenate(own) for kind, own in kinds.items()}
+                facet = facet[:, _FLIPPED[facet.shape[1]]]
+            kinds.setdefault(face.element.meshio_name, []).append(facet)
+    facets = {kind: np.concatenate(blocks) for kind, blocks in kinds.items()}
     corners = {kind: FACETS[kind].corners for kind in facets}
     width = max(corners.values())
     keys = [
@@ -159,11 +159,11 @@ def _boundary(cells):
     ]
     _, inverse, counts = np.unique(np.concatenate(keys), axis=0, return_inverse=True, return_counts=True)
     once, found, start = counts[inverse.ravel()] == 1, {}, 0
-    for kind, own in facets.items():
-        single = once[start : start + len(own)]
-        start += len(own)
+    for kind, nodes in facets.items():
+        single = once[start : start + len(nodes)]
+        start += len(nodes)
         if single.any():
-            found[kind] = own[single]
+            found[kind] = nodes[single]
     return found
 
 

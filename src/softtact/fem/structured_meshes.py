@@ -113,8 +113,8 @@ def _kuhn() -> np.ndarray:
 
 def _facets_within(boundary: Facets, face: Facets) -> Facets:
     """The facets of a boundary all of whose nodes belong to a face."""
-    own = np.unique(np.concatenate([nodes.ravel() for nodes in face.values()]))
-    found = {kind: nodes[np.isin(nodes, own).all(axis=1)] for kind, nodes in boundary.items()}
+    of_face = np.unique(np.concatenate([nodes.ravel() for nodes in face.values()]))
+    found = {kind: nodes[np.isin(nodes, of_face).all(axis=1)] for kind, nodes in boundary.items()}
     return {kind: nodes for kind, nodes in found.items() if len(nodes)}
 
 

@@ -1,15 +1,15 @@
-"""How detailed an object is, and which model that asks for (the paper, sec. 3.3.1, fig. 4, table 2).
+"""Complexity of an object, and the model chosen by it (the paper, sec. 3.3.1, fig. 4, table 2).
 
 NPt  points of the object's mesh as the file stores it: three per facet, not merged
 CHt  unique edges of the triangulated convex hull of those points (3 V - 6 for V corners)
 NPo  points of the overlap: the part of the object that the sensor can touch
 CHo  unique edges of the overlap's convex hull
 
-Fine details add points but hardly change the hull, so NPt / CHt and NPo / CHo grow with them; a convex body that
-has its corners on the hull only stays at 2.
+Fine details add points but hardly change the hull, so NPt / CHt and NPo / CHo grow with them; for a convex body with
+all corners on the hull they are 2.
 
 *The overlap.* The paper does not define it. Its six NPo are only 3 to 9 % of NPt, too few for all that lies over
-the footprint, so the overlap is limited in height too: points over the footprint and at most `reach_mm` above the
+the footprint, so the overlap is limited in height, too: points over the footprint and at most `reach_mm` above the
 object's lowest facet there. The default reach is the thickness of the sensor's soft layers, the deepest that an object
 can sink: an evenly meshed sphere of 30 mm has 8.3 % of its points within it, the paper's sphere 8.7 %.
 """
@@ -93,8 +93,8 @@ def hull_edges(points: np.ndarray) -> int:
         return 1
     try:
         facets = ConvexHull(points).simplices
-    except QhullError:  # flat, but not along an axis: look at it in that plane or line
-        return hull_edges(_in_own_plane(points))
+    except QhullError:  # flat, but not along an axis: in coordinates of that plane or line
+        return hull_edges(_in_their_plane(points))
     return 2 * len(facets) - 3 if points.shape[1] == 2 else _unique_edges(facets)
 
 
@@ -102,8 +102,8 @@ def choose_model(NPt: int, CHt: int, NPo: int, CHo: int, *, rule: str = "any", t
                  overlap: float = OVERLAP_THRESHOLD) -> str:
     """'hyperelastic' for an object with fine details, else 'elastic'.
 
-    Details show where NPt >= `total` CHt, or NPo >= `overlap` CHo. The paper's text asks for both (`rule="all"`), its
-    table 2 holds only with either (`rule="any"`). An object without a point in the overlap shows no detail there.
+    Details mean NPt >= `total` CHt, or NPo >= `overlap` CHo. The paper's text requires both (`rule="all"`), its
+    table 2 agrees only with either (`rule="any"`). An object without a point in the overlap has no detail there.
     """
     if rule not in RULES:
         raise InputError(f"The rule {rule!r} for the choice of model is not known; write 'any' or 'all'.")
@@ -141,7 +141,7 @@ def _unique_edges(facets):
     return len(np.unique(edges, axis=0))
 
 
-def _in_own_plane(points):
+def _in_their_plane(points):
     """Coordinates (n, d - 1) along the directions in which points (n, d) spread most."""
     centred = points - points.mean(axis=0)
     _, _, directions = np.linalg.svd(centred, full_matrices=False)

@@ -1,7 +1,7 @@
 """Meshes that users bring: read, checked, in mm, and placed over the sensor.
 
-What a solver would silently get wrong (open, inverted, overlapping or wrongly scaled meshes) is refused here, in one sentence with
-its remedy. Unions of closed meshes, and whether one is a cavity of others, are manifold3d's.
+Meshes that would silently give wrong results (open, inverted, overlapping or wrongly scaled) are refused in one sentence with the
+remedy. manifold3d computes unions of closed meshes and cavities.
 """
 
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ from softtact.geometry.stl import read_stl
 
 UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, "in": 25.4}
 _READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply}
-MIN_SIZE_MM = 1.0  # smaller than a taxel's resolution by far
+MIN_SIZE_MM = 1.0  # far below a taxel's resolution
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
-_MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
+_MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are merged
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
 _FOLD = 5e-7  # one minus the cosine of the angle, 1e-3, below which two facets on one side of an edge lie on each other
-_SLIVER = 1e-3  # of the size: facets lower than this have no certain normal
-OVERLAP = 1e-6  # of a body's volume: what is less is round-off
+_SLIVER = 1e-3  # of the size: facets with a smaller height have no reliable normal
+OVERLAP = 1e-6  # of a body's volume: a smaller overlap is round-off
 
 
 def read_triangles(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
@@ -56,7 +56,7 @@ def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
     """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the frame of the file.
 
     path : STL (binary or text), OBJ or PLY
-    unit : 'mm', 'cm', 'm', 'inch' or 'in'; the file itself does not say
+    unit : 'mm', 'cm', 'm', 'inch' or 'in'; mesh files do not state it
     min_size_mm, max_size_mm : range of a plausible largest side
 
     Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, folded, overlapping, of a
@@ -79,9 +79,9 @@ def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Refuse facets that lie on their neighbour, as those of a concave polygon that was cut from one corner.
+    """Refuse facets that lie on their neighbour, as in a concave polygon that was triangulated from one corner.
 
-    mesh : neighbours look to the same side, so that the normals of two that lie on each other are opposite
+    mesh : consistently oriented, so that the normals of two facets that lie on each other are opposite
     """
     normals = mesh.face_normals[mesh.face_adjacency]                                   # (k, 2, 3)
     opposite = np.flatnonzero(np.einsum("kd,kd->k", normals[:, 0], normals[:, 1]) < _FOLD - 1)
@@ -91,12 +91,12 @@ def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
     folded = heights > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
     if folded.any():
         x, y, z = edges[folded.argmax()].mean(axis=0)
-        raise InputError(f"{path}: {folded.sum()} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as where "
-                         "concave polygons were cut into triangles from one corner; triangulate the mesh anew where it was made.")
+        raise InputError(f"{path}: {folded.sum()} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as in "
+                         "concave polygons that were triangulated from one corner; triangulate it again in its modelling program.")
 
 
 def merge_facets(triangles: np.ndarray) -> trimesh.Trimesh:
-    """Mesh of facets (n, 3, 3) whose equal corners are joined; facets that collapse by it are left out."""
+    """Mesh of facets (n, 3, 3) with equal corners merged; facets that collapse are left out."""
     mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles), process=False)
     mesh.merge_vertices(digits_vertex=_MERGE_DECIMALS)
     a, b, c = mesh.faces.T
@@ -129,19 +129,21 @@ def default_pose(mesh: trimesh.Trimesh) -> Pose:
 
 def check_over_sensor(mesh: trimesh.Trimesh, footprint_mm: tuple[float, float], *, name: str = "The object") -> None:
     """Refuse a placed mesh of which no facet lies over the sensor's footprint (x, y sides in mm)."""
-    if np.any(facets_over(mesh.triangles, footprint_mm)):
-        return
-    (x0, y0, _), (x1, y1, _) = mesh.bounds
-    raise InputError(
-        f"{name} misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no part of "
-        f"it is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose."
-    )
+    if not np.any(facets_over(mesh.triangles, footprint_mm)):
+        raise misses_sensor(mesh.vertices, footprint_mm, name=name)
+
+
+def misses_sensor(points: np.ndarray, footprint_mm: tuple[float, float], *, name: str = "The object") -> InputError:
+    """The refusal of an object with points (n, 3) in mm of which nothing lies over the sensor's footprint."""
+    (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
+    return InputError(f"{name} misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no part of "
+                      f"it is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose.")
 
 
 def facets_over(triangles: np.ndarray, footprint_mm: tuple[float, float]) -> np.ndarray:
     """Which facets (n, 3, 3) overlap, seen from above, a rectangle of sides `footprint_mm` about the origin, (n,) bool.
 
-    Separating axes: two convex shapes are apart exactly if they are so along a side's normal of one of them.
+    Separating axes: two convex shapes are apart exactly if they are apart along the normal of a side of one of them.
     """
     xy = triangles[..., :2]  # (n, 3, 2)
     half = np.asarray(footprint_mm, float) / 2
@@ -220,7 +222,7 @@ def _refuse_inverted(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Closed pieces that overlap or share walls have facets inside the body, which no contact search expects."""
+    """Closed pieces that overlap or share walls have facets inside the body, which the contact search does not allow."""
     if mesh.body_count < 2:
         return
     pieces = mesh.split(only_watertight=False)
@@ -237,19 +239,19 @@ def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def volume_of(mesh: trimesh.Trimesh) -> float:
-    """Volume of a closed mesh, negative of one that faces inwards; that of trimesh warns of a division by a volume of 0."""
+    """Volume of a closed mesh, negative if it faces inwards; trimesh's warns of a division by zero for a volume of 0."""
     a, b, c = np.moveaxis(mesh.triangles - mesh.vertices.mean(axis=0), 1, 0)
     return float(np.einsum("kd,kd->", a, np.cross(b, c)) / 6)
 
 
 def solid_of(mesh: trimesh.Trimesh, *, inverted: bool = False) -> Manifold:
-    """`Manifold` of a closed mesh, of which the facets are turned if it is `inverted`; empty where it is none."""
+    """`Manifold` of a closed mesh, with its facets reversed if it is `inverted`; empty for a mesh that is not closed."""
     faces = mesh.faces[:, ::-1] if inverted else mesh.faces
     return Manifold(Mesh64(np.ascontiguousarray(mesh.vertices, dtype=float), np.ascontiguousarray(faces, dtype=np.uint64)))
 
 
 def union_of(meshes: Sequence[trimesh.Trimesh]) -> Manifold | None:
-    """One `Manifold` of closed meshes, or None where one of them is none, or there are none."""
+    """One `Manifold` of closed meshes, or None where one of them is not closed, or without meshes."""
     solids = [solid_of(mesh) for mesh in meshes]
     if not solids or any(solid.is_empty() for solid in solids):
         return None

@@ -1,8 +1,8 @@
-r"""OBJ files (Wavefront): vertices and polygonal faces, or one sentence why not.
+r"""OBJ files (Wavefront): vertices and polygonal faces, or a refusal in one sentence.
 
 Numbers of corners count from 1, or back from the last vertex before the face (-1). Texture and normal numbers, colours, groups,
-materials, lines and points are passed over: they change no body. Refused: free-form surfaces, other files that the file calls,
-statements that no OBJ has. Appendix B1, Object Files, of Wavefront's Advanced Visualizer manual (1990).
+materials, lines and points are ignored, as they do not change a body. Refused: free-form surfaces, calls of other files,
+statements that are not part of the format. Appendix B1, Object Files, of Wavefront's Advanced Visualizer manual (1990).
 """
 
 import re
@@ -15,12 +15,12 @@ from softtact.errors import InputError
 from softtact.geometry.mesh_text import is_finite, no_number, plain_text, shown
 from softtact.geometry.polygons import Polygons, facets_of
 
-_PASSED_OVER = frozenset(b"vt vn vp g o s mg usemtl mtllib usemap maplib shadow_obj trace_obj lod bevel c_interp d_interp".split())
+_IGNORED = frozenset(b"vt vn vp g o s mg usemtl mtllib usemap maplib shadow_obj trace_obj lod bevel c_interp d_interp".split())
 _FREE_FORM = frozenset(b"cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con bzp bsp cdc cdp res ctech "
                        b"stech".split())
 _CALLS = frozenset((b"call", b"csh"))
 _AGAIN = "export the mesh again."
-# Lines of plain vertices or faces in a row, which a large file mostly consists of, are taken at once: ten times as fast.
+# Consecutive lines of plain vertices or faces, most of a large file, are read at once, which is ten times as fast.
 _VERTICES = re.compile(rb"(?:[ \t]*+v(?:[ \t]++[-+.\deE]++){3}[ \t]*+\n){1,20000}+")
 _FACES = re.compile(rb"(?:[ \t]*+f(?:[ \t]++\d{1,18}+(?:/\d*+){0,2}+){3,}+[ \t]*+\n){1,20000}+")
 
@@ -31,23 +31,23 @@ def read_obj(path: Path) -> np.ndarray:
     if b"#" in data:
         data = re.sub(rb"#[^\n]*", b"", data)
     if data.rstrip().endswith(b"\\"):
-        raise InputError(f"{path}: its last line is to go on in a next one, so the file was cut off; {_AGAIN}")
+        raise InputError(f"{path}: its last line continues in a next one, so the file was cut off; {_AGAIN}")
     if b"\\" in data:
         data = re.sub(rb"(?:[^\n]*\\\n)+[^\n]*", _joined, data)
     statements = _Statements(path)
     at = 0
     while at < len(data):
-        at = statements.take(data, at)
+        at = statements.read(data, at)
     return facets_of(path, statements.polygons())
 
 
 def _joined(lines):
-    """Lines that go on after a backslash as one, and as many empty ones behind it as keep the numbers of those that follow."""
+    """Lines continued by a backslash as one line, followed by empty lines that keep the line numbers."""
     return lines.group().replace(b"\\\n", b" ") + b"\n" * lines.group().count(b"\\\n")
 
 
 class _Statements:
-    """What the statements of a file declare."""
+    """The declarations of a file's statements."""
 
     def __init__(self, path):
         self.path, self.line = path, 1
@@ -55,8 +55,8 @@ class _Statements:
         self.corners, self.counts, self.face_lines = array("q"), array("q"), array("q")
         self.points_at_last_element = 0
 
-    def take(self, data, at):
-        """Take the statements at a byte of the text; the byte behind them."""
+    def read(self, data, at):
+        """Read the statements at a byte of the text; return the byte after them."""
         if run := _VERTICES.match(data, at):
             return self._plain_vertices(run)
         if run := _FACES.match(data, at):
@@ -64,7 +64,7 @@ class _Statements:
         return self._statement(data, at)
 
     def _plain_vertices(self, run):
-        """Take lines `v x y z`."""
+        """Read lines `v x y z`."""
         words = run.group().replace(b"v", b" ").split()
         try:
             values = list(map(float, words))
@@ -77,7 +77,7 @@ class _Statements:
         return run.end()
 
     def _plain_faces(self, run):
-        """Take lines `f 1 2 3`, of numbers that count from 1 and may have those of textures and normals behind them."""
+        """Read lines `f 1 2 3`, with numbers from 1, which may be followed by those of textures and normals."""
         text = run.group()
         if b"/" in text:
             text = re.sub(rb"/\S*", b"", text)
@@ -91,7 +91,7 @@ class _Statements:
         return run.end()
 
     def _statement(self, data, at):
-        """Take one line of any kind."""
+        """Read one line of any kind."""
         end = data.index(b"\n", at)
         words = data[at:end].split()
         kind = words[0].lower() if words else b"g"
@@ -101,7 +101,7 @@ class _Statements:
             self._face(words[1:])
         elif kind in (b"l", b"p"):
             self.points_at_last_element = len(self.point_lines)
-        elif kind not in _PASSED_OVER:
+        elif kind not in _IGNORED:
             raise self._no_statement(words[0])
         self.line += 1
         return end + 1
@@ -133,7 +133,7 @@ class _Statements:
         """The number from 1 of the vertex of a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`."""
         known = len(self.point_lines)
         if not re.fullmatch(rb"[-+]?\d{1,18}(/[-+]?\d*){0,2}", word):
-            raise self._refusal(f"{shown(word)} is no number of a vertex; {_AGAIN}")
+            raise self._refusal(f"{shown(word)} is not the number of a vertex; {_AGAIN}")
         number = int(word.partition(b"/")[0])
         if number == 0 or number < -known:
             begin = "vertices are counted from 1" if number == 0 else f"only {known} vertices come before it"
@@ -146,13 +146,13 @@ class _Statements:
                                  "polygons.")
         if word.lower() in _CALLS:
             return self._refusal(f"{shown(word)} calls another file or program; put the whole mesh into one file.")
-        return self._refusal(f"{shown(word)} is no statement of an OBJ; {_AGAIN}")
+        return self._refusal(f"{shown(word)} is not a statement of OBJ files; {_AGAIN}")
 
     def _refusal(self, what, line=None):
         return InputError(f"{self.path}: line {line or self.line}: {what}")
 
     def polygons(self):
-        """The faces, after what the file declares was compared with what they use."""
+        """The faces, after a check of the vertices that they use."""
         points = np.array(self.points).reshape(-1, 3)
         wrong = ~np.isfinite(points).all(axis=1)
         if wrong.any():
@@ -164,7 +164,7 @@ class _Statements:
         return polygons
 
     def _refuse_unused(self, polygons):
-        """Refuse vertices without faces where they show that faces were lost."""
+        """Refuse vertices without faces where that means that faces were lost."""
         used = np.zeros(len(polygons.points), dtype=bool)
         used[polygons.corners[polygons.corners < len(used)]] = True
         if len(polygons.counts) == 0 or used.all():
@@ -176,5 +176,5 @@ class _Statements:
         faces = [tuple(sorted(face)) for face in np.split(polygons.corners, np.cumsum(polygons.counts)[:-1])]
         twice = len(faces) - len(set(faces))
         if twice:
-            raise InputError(f"{self.path}: {twice} faces are there twice, and no face uses {(~used).sum()} of the vertices, so "
-                             "each body seems to count its vertices from 1 anew; export the bodies as one mesh.")
+            raise InputError(f"{self.path}: {twice} faces are repeated, and no face uses {(~used).sum()} of the vertices, so "
+                             "each body probably counts its vertices from 1; export the bodies as one mesh.")

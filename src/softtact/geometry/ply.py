@@ -1,7 +1,7 @@
-"""PLY files, text and binary: vertices and polygonal faces, or one sentence why not.
+"""PLY files, text and binary: vertices and polygonal faces, or a refusal in one sentence.
 
 The header declares elements with properties, and their number; the body must hold as many, and nothing else. Elements and
-properties besides the vertices' `x`, `y`, `z` and the faces' `vertex_indices` are passed over. Refused: triangle strips.
+properties besides the vertices' `x`, `y`, `z` and the faces' `vertex_indices` are ignored. Refused: triangle strips.
 Layout: Turk, The PLY Polygon File Format (1994).
 """
 
@@ -54,10 +54,10 @@ class _Header:
 
 @dataclass(frozen=True)
 class Rows:
-    """What the rows of an element hold.
+    """Contents of the rows of an element.
 
-    values : by a property's name its values, of all rows behind each other
-    counts : by a list's name the number of its values in each row
+    values : {property: its values of all rows, concatenated}
+    counts : {list: number of its values in each row}
     places : the number of each row: its line in a text, its number from 0 in a binary file
     """
 
@@ -90,7 +90,7 @@ def _read_header(path, lines):
     header = _Header()
     for number, line in enumerate(lines, 2):
         words = line.decode("utf-8", errors="replace").split()
-        if words and words[0] not in ("comment", "obj_info") and not _take(header, words):
+        if words and words[0] not in ("comment", "obj_info") and not _read_line(header, words):
             raise InputError(f"{path}: line {number}: {shown(line)} is no line of a PLY header; {_AGAIN}")
     if header.order is None:
         raise InputError(f"{path}: its header declares no format; {_AGAIN}")
@@ -98,8 +98,8 @@ def _read_header(path, lines):
     return header
 
 
-def _take(header, words):
-    """Take a line of the header; whether it is one."""
+def _read_line(header, words):
+    """Read a line of the header; return whether it is valid."""
     match words:
         case ["format", form, "1.0"] if form in _ORDERS and header.order is None:
             header.order = _ORDERS[form]
@@ -115,14 +115,14 @@ def _take(header, words):
 
 
 def _add(header, item):
-    """Add a property to the last element; whether its name is new there."""
+    """Add a property to the last element; return whether its name is new there."""
     element = header.elements[-1]
     header.elements[-1] = replace(element, properties=(*element.properties, item))
     return item.name not in (other.name for other in element.properties)
 
 
 def _indices_of(path, header):
-    """The name of the faces' list of vertices, after the header was found to declare vertices and faces."""
+    """The name of the faces' list of vertices, after a check that the header declares vertices and faces."""
     elements = {element.name: element for element in header.elements}
     if "tristrips" in elements:
         raise InputError(f"{path}: it holds strips of triangles ('tristrips'), which are not read; export the mesh with faces.")
@@ -151,7 +151,7 @@ class _Body:
                     {name: np.array(column) for name, column in counts.items()}, np.array(places))
 
     def _row(self, element, number, kept, counts):
-        """Append the wanted numbers of a row to their columns; its place."""
+        """Append the wanted numbers of a row to their columns; return its place."""
         raise NotImplementedError
 
     def _cut_off(self, element, number):
@@ -165,9 +165,9 @@ class _Text(_Body):
     place = "line"
 
     def __init__(self, path: Path, data: bytes, first_line: int) -> None:
-        if b"_" in data:     # Python would take 1_0 for a number
+        if b"_" in data:     # Python reads 1_0 as a number
             line = first_line - 1 + line_at(data, data.index(b"_"))
-            raise InputError(f"{path}: line {line}: '_' stands in a number; {_AGAIN}")
+            raise InputError(f"{path}: line {line}: a number contains '_'; {_AGAIN}")
         self.path = path
         self.lines = ((number, words) for number, text in enumerate(data.split(b"\n"), first_line) if (words := text.split()))
 
@@ -176,7 +176,7 @@ class _Text(_Body):
         if not words:
             raise self._cut_off(element, number)
         try:
-            end = _take_words(element, words, kept, counts)
+            end = _read_words(element, words, kept, counts)
         except (ValueError, OverflowError, IndexError):
             end = -1
         if end != len(words):
@@ -185,14 +185,14 @@ class _Text(_Body):
         return line
 
     def refuse_more(self) -> None:
-        """Refuse lines behind the last row."""
+        """Refuse lines after the last row."""
         for line, words in self.lines:
             raise InputError(f"{self.path}: line {line}: {shown(b' '.join(words))} follows the last row that the header declares; "
                              f"{_AGAIN}")
 
 
-def _take_words(element, words, kept, counts):
-    """Append the wanted numbers of a row's words; how many words the row has."""
+def _read_words(element, words, kept, counts):
+    """Append the wanted numbers of a row's words; return the number of words of the row."""
     at = 0
     for item in element.properties:
         length = 1
@@ -219,7 +219,7 @@ class _Binary(_Body):
         self.path, self.data, self.at, self.order = path, data, at, order
 
     def rows(self, element: Element, wanted: tuple[str, ...]) -> Rows:
-        """The wanted properties of all rows of the next element; all at once where each row is laid out as the first."""
+        """The wanted properties of all rows of the next element; read at once where each row has the layout of the first."""
         start = self.at
         layout = self._first_layout(element)
         end = start + element.count * layout.itemsize
@@ -264,21 +264,21 @@ class _Binary(_Body):
 
     def _numbers(self, code, count):
         """The next `count` numbers of a type."""
-        if count > len(self.data) - self.at:     # before struct makes room for them
+        if count > len(self.data) - self.at:     # before struct allocates memory for them
             raise struct.error
         layout, at = f"{self.order}{count}{code}", self.at
         self.at += struct.calcsize(layout)
         return struct.unpack_from(layout, self.data, at)
 
     def refuse_more(self) -> None:
-        """Refuse bytes behind the last row."""
+        """Refuse bytes after the last row."""
         if self.data[self.at:].strip(b" \t\r\n"):
             raise InputError(f"{self.path}: the rows that its header declares end at byte {self.at}, but the file has "
                              f"{len(self.data)}; {_AGAIN}")
 
 
 def _polygons(path: Path, vertices: Rows, faces: Rows, indices: str, place: str) -> Polygons:
-    """The faces as polygons, after their vertices were found to be finite, and each to have three corners."""
+    """The faces as polygons, after a check that vertices are finite and faces have three corners."""
     points = np.column_stack([np.asarray(vertices.values[name], dtype=float) for name in "xyz"])
     wrong = ~np.isfinite(points).all(axis=1)
     if wrong.any():

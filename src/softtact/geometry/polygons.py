@@ -1,10 +1,10 @@
 """Polygons of mesh files as triangles that cover each polygon once, whatever its shape.
 
-A quadrilateral is split along the diagonal that divides it the more evenly; both halves must face the polygon's side, so that
-concave ones are split inside. Polygons of more corners are triangulated in the plane of their vector area: convex ones from one
-corner, others by manifold3d (ear clipping). The result does not depend on the corner a polygon begins with, unless several
-splits are equally good.
-Refused: polygons that cross themselves, and those whose corners leave one plane so far that their surface is a guess.
+A quadrilateral is split along the diagonal that divides it more evenly; both halves must face the polygon's side, so that concave
+ones are split inside. Polygons with more corners are triangulated in the plane of their vector area: convex ones from one corner,
+others by manifold3d (ear clipping). The result does not depend on the corner at which a polygon begins, unless several splits are
+equally good.
+Refused: polygons that cross themselves, and those whose corners are so far from one plane that their surface is ambiguous.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +15,9 @@ from manifold3d import CrossSection, FillRule, triangulate
 
 from softtact.errors import InputError
 
-_ROUND_OFF = 1e-6      # of a polygon's area: what is less comes from coordinates in single precision
-_BENT_QUAD = 0.2       # of the size: how far four corners may leave their mean plane; a square folded by 90 degrees
-_BENT_POLYGON = 0.01   # the same of more corners
+_ROUND_OFF = 1e-6      # of a polygon's area: a smaller error comes from coordinates in single precision
+_BENT_QUAD = 0.2       # of the size: largest distance of four corners from their mean plane; a square folded by 90 degrees
+_BENT_POLYGON = 0.01   # the same for more corners
 _ROUNDED = 1e-4        # of the mesh's size: lower heights and widths come from coordinates with few digits
 _SPLITS = np.array([[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]])     # of a quadrilateral
 
@@ -61,14 +61,14 @@ def triangulated(points: np.ndarray, *, width: float = 0.0) -> np.ndarray:
 
     width : of strips, in the unit of the points, that may be covered twice or from behind
 
-    A polygon that covers more in this way has no triangulation; its triangles then face the other side.
+    A polygon that covers more in this way has no triangulation; its triangles then face the opposite side.
     """
     sides = _sides(points)
     sizes = np.abs(points - points[:, :1]).max(axis=(1, 2))
     plane = _in_plane(points, sides) / np.where(sizes > 0, sizes, 1.0)[:, None, None]
     fan = np.array([[0, k, k + 1] for k in range(1, points.shape[1] - 1)])
     triangles = np.repeat(fan[None], len(points), axis=0)
-    # Those without a side lie on one line, or cross themselves so that the fan's triangles look to both sides.
+    # Polygons without a side lie on one line, or cross themselves so that the fan's triangles face both sides.
     for number in np.flatnonzero(~_is_convex(plane) & sides.any(axis=1)):
         clipped = _ear_clipped(plane[number], max(_ROUND_OFF, width / sizes[number]))
         triangles[number] = fan[:, ::-1] if clipped is None else clipped
@@ -76,7 +76,7 @@ def triangulated(points: np.ndarray, *, width: float = 0.0) -> np.ndarray:
 
 
 def _in_plane(points, sides):
-    """Points (k, count, 2) in the planes across `sides` (k, 3), seen from there."""
+    """Points (k, count, 2) in the planes normal to `sides` (k, 3), seen from their tips."""
     spokes = points - points[:, :1]
     longest = np.linalg.norm(spokes, axis=2).argmax(axis=1)
     x = spokes[np.arange(len(points)), longest]
@@ -87,7 +87,7 @@ def _in_plane(points, sides):
 
 
 def _is_convex(plane):
-    """Whether polygons (k, count, 2) turn left at each corner, and once around in all (k,)."""
+    """Whether polygons (k, count, 2) turn left at each corner, and once around in total (k,)."""
     along = np.roll(plane, -1, axis=1) - plane
     x, y = np.moveaxis(along, 2, 0)
     following_x, following_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
@@ -96,17 +96,17 @@ def _is_convex(plane):
 
 
 def _ear_clipped(plane, tolerance):
-    """Triangles (count - 2, 3) of one polygon (count, 2), or None where it covers more than a small area twice or turned over."""
+    """Triangles (count - 2, 3) of one polygon (count, 2), or None where it covers more than a small area twice or reversed."""
     x, y = plane.T
     area = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
     if abs(CrossSection([plane], FillRule.NonZero).area() - area) > tolerance:
         return None
-    triangles = np.asarray(triangulate([plane], allow_convex=False))     # its short cut makes triangles without area
+    triangles = np.asarray(triangulate([plane], allow_convex=False))     # allow_convex makes triangles without area
     return triangles if len(triangles) == len(plane) - 2 else None
 
 
 def _triangles(path, polygons, which, corners, rounded):
-    """Triangles (k, count - 2, 3, 3) of polygons of as many corners (k, count); heights below `rounded` are passed over."""
+    """Triangles (k, count - 2, 3, 3) of polygons with equal numbers of corners (k, count); heights below `rounded` are ignored."""
     points = polygons.points[corners]
     if points.shape[1] == 3:
         return points
@@ -114,17 +114,17 @@ def _triangles(path, polygons, which, corners, rounded):
     sizes = 2 * np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     bend = _BENT_QUAD if points.shape[1] == 4 else _BENT_POLYGON
     _refuse(path, polygons, which, _heights(points, sides) > np.maximum(bend * sizes, rounded),
-            "leaves one plane so far that its surface is a guess; triangulate the mesh before its export")
+            "is so far from a plane that its surface is ambiguous; triangulate the mesh before its export")
     if points.shape[1] == 4:
         triangles = _split_quads(points, sides, corners)
     else:
         triangles = points[np.arange(len(points))[:, None, None], triangulated(points, width=rounded)]
-    _refuse(path, polygons, which, _folded(triangles, sides, rounded * sizes), "crosses itself; mend it where the mesh was made")
+    _refuse(path, polygons, which, _folded(triangles, sides, rounded * sizes), "crosses itself; repair it in its modelling program")
     return triangles
 
 
 def _without_repeated(polygons):
-    """The polygons without corners that repeat the one before; what is left of less than three corners bounds no area."""
+    """The polygons without corners that repeat the one before, and without polygons that then have less than three corners."""
     owner = np.repeat(np.arange(len(polygons.counts)), polygons.counts)
     ends = np.cumsum(polygons.counts)
     following = np.arange(1, len(owner) + 1)
@@ -144,7 +144,7 @@ def _areas(triangles):
 
 
 def _sides(points):
-    """Unit vectors (k, 3) along the vector areas of polygons (k, count, 3), to which they face; 0 where there is none."""
+    """Unit vectors (k, 3) along the vector areas of polygons (k, count, 3), their facing side; 0 where there is none."""
     spokes = points - points[:, :1]
     area = 0.5 * np.cross(spokes[:, 1:-1], spokes[:, 2:]).sum(axis=1)
     length = np.linalg.norm(area, axis=1, keepdims=True)
@@ -153,7 +153,7 @@ def _sides(points):
 
 
 def _heights(points, sides):
-    """How far (k,) corners leave the polygons' mean planes."""
+    """Largest distance (k,) of corners from the polygons' mean planes."""
     return np.abs(np.einsum("knd,kd->kn", points - points.mean(axis=1, keepdims=True), sides)).max(axis=1)
 
 
@@ -162,7 +162,7 @@ def _split_quads(points, sides, corners):
     options = points[:, _SPLITS]                                                       # (k, split, half, 3, 3)
     smaller = np.einsum("kshd,kd->ksh", _areas(options), sides).min(axis=2)            # (k, split)
     alike = np.abs(smaller[:, 0] - smaller[:, 1]) <= _ROUND_OFF * np.abs(smaller).max(axis=1)
-    at_lowest = corners.argmin(axis=1) % 2      # equally good: from the corner with the lowest number, wherever the polygon begins
+    at_lowest = corners.argmin(axis=1) % 2      # equally good: from the corner with the lowest number, whatever the first corner
     return options[np.arange(len(points)), np.where(alike, at_lowest, smaller.argmax(axis=1))]
 
 
@@ -174,16 +174,16 @@ def _folded(triangles, sides, negligible):
     return (-along.min(axis=1) > _ROUND_OFF * whole + negligible) | (0.5 * whole - along.sum(axis=1) > negligible)
 
 
-def _refuse(path, polygons, which, wrong, why):
+def _refuse(path, polygons, which, wrong, fault):
     """Refuse the first of the polygons `which` that is wrong."""
     if wrong.any():
         number = which[wrong.argmax()]
         raise InputError(f"{path}: {polygons.place} {polygons.places[number]}: the polygon of {polygons.counts[number]} corners "
-                         f"{why}.")
+                         f"{fault}.")
 
 
 def _refuse_out_of_range(path, polygons):
-    """Refuse a corner that is none of the file's points."""
+    """Refuse a corner whose number is not a point of the file."""
     known = len(polygons.points)
     wrong = (polygons.corners < 0) | (polygons.corners >= known)
     if wrong.any():

@@ -1,7 +1,7 @@
 """Pose of an object in the sensor frame: translation and rotation of its reference point, stated or drawn with a seed.
 
-A drawn pose turns the object about z by any angle at which its pressing part fits the sensor as well as unturned, and puts it
-anywhere in the room that is left. It does not tilt it.
+A drawn pose turns the object about z by any angle at which its pressing part fits on the sensor as well as without the turn, and
+puts it anywhere in the remaining space. It does not tilt the object.
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from softtact.errors import InputError
 
 _FORM = "x,y,z,rx,ry,rz in mm and degrees"
-PRESSING_MM = 1.0    # above the lowest point: the part that carries the force
-RIM_MM = 1.0         # along the sensor's border, where the layers' sides are held, that a pressing part leaves free
+PRESSING_MM = 1.0    # height above the lowest point of the part that carries the force
+RIM_MM = 1.0         # strip along the sensor's border, where the layers' sides are held, without pressing parts
 _LEAST_TURN_DEG = 1.0
 
 
@@ -33,7 +33,7 @@ class Pose:
     def from_values(cls, values: Sequence[float | str]) -> "Pose":
         """Pose of six numbers: translation in mm; angles in degrees about the sensor's fixed x, then y, then z axis.
 
-        That is scipy's `Rotation.from_euler("xyz", ...)`, and roll, pitch, yaw as robot descriptions have them.
+        That is scipy's `Rotation.from_euler("xyz", ...)`, and roll, pitch, yaw of robot descriptions.
         """
         try:
             numbers = np.array([float(value) for value in values])
@@ -81,10 +81,10 @@ def draw_poses(triangles: np.ndarray, *, count: int, footprint_mm: tuple[float, 
 
 def _draw_pose(pressing, lowest, footprint, rng):
     turn, along = rng.uniform(-180, 180), rng.uniform(-1, 1, 2)
-    needed = np.minimum(_room(pressing, 0.0, footprint)[0], 0.0)      # what is wider than the sensor is so in any place
+    needed = np.minimum(_room(pressing, 0.0, footprint)[0], 0.0)      # negative for a part wider than the sensor
     room, middle = _room(pressing, turn, footprint)
     while (room < needed).any():
-        turn = rng.uniform(-abs(turn), abs(turn)) if abs(turn) > _LEAST_TURN_DEG else 0.0     # a smaller one, until it fits
+        turn = rng.uniform(-abs(turn), abs(turn)) if abs(turn) > _LEAST_TURN_DEG else 0.0     # a smaller angle, until it fits
         room, middle = _room(pressing, turn, footprint)
     x, y = np.round(along * np.maximum(room, 0.0) - middle, 2)
     pose = [x, y, -lowest, 0.0, 0.0, np.round(turn, 1)]
@@ -92,7 +92,7 @@ def _draw_pose(pressing, lowest, footprint, rng):
 
 
 def _room(points, turn_deg, footprint):
-    """How far (2,) the turned points (n, 2) may move to either side, in mm, and the middle (2,) of their bounding box."""
+    """Largest displacement (2,) of the turned points (n, 2) to either side, in mm, and the middle (2,) of their bounding box."""
     c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
     turned = points @ np.array([[c, s], [-s, c]])
     low, high = turned.min(axis=0), turned.max(axis=0)

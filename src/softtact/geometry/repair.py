@@ -1,8 +1,8 @@
-"""Repair of meshes whose body is beyond doubt; each step is reported, and what would have to be guessed is refused.
+"""Repair of meshes that define a body without ambiguity; each step is reported, and ambiguous meshes are refused.
 
-Repaired: facets without finite corners or without area, facets that are there twice, corners that lie apart by round-off or on an
-edge of a facet that lacks them (T-junctions), holes that are flat or small, facets that face against their neighbours, bodies
-inside out, bodies that overlap. Not repaired: large curved holes, edges where more than two walls meet, facets that lie on their
+Repaired: facets without finite corners or without area, repeated facets, corners that differ by round-off or lie on an edge of a
+facet without them (T-junctions), holes that are flat or small, facets oriented against their neighbours, bodies inside out, bodies
+that overlap. Not repaired: large curved holes, edges where more than two walls meet, facets that lie on their
 neighbours, double-sided bodies, flat or empty meshes, sizes that no body on a sensor has.
 `meshes.read_mesh` then checks the result as it checks any mesh.
 """
@@ -31,21 +31,21 @@ from softtact.geometry.meshes import (
 )
 from softtact.geometry.polygons import triangulated
 
-_APART = 1e-5        # of the size: corners nearer to each other are one point that was rounded twice
-_FLAT_HOLE = 1e-3    # of the size: how far a hole's rim may leave its plane
-_SMALL_HOLES = 0.05  # of the surface: curved holes that are closed by a plane piece all the same
+_APART = 1e-5        # of the size: closer corners are one point with different rounding
+_FLAT_HOLE = 1e-3    # of the size: largest distance of a hole's rim from its plane
+_SMALL_HOLES = 0.05  # of the surface: area of curved holes that are also closed by plane pieces
 
 
 @dataclass(frozen=True)
 class Mended:
-    """A closed mesh (trimesh, mm) and the sentences that say what was done to it."""
+    """A closed mesh (trimesh, mm) and sentences on its repairs."""
 
     mesh: trimesh.Trimesh
     repairs: list
 
 
 def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM, max_size_mm: float = MAX_SIZE_MM) -> Mended:
-    """Read a mesh as `read_mesh` does, and mend it where that leaves no doubt; else InputError with the reason."""
+    """Read a mesh as `read_mesh` does, and repair it where that is not ambiguous; else InputError with the reason."""
     path = Path(path)
     repairs: list[str] = []
     stored = load_sized(path, unit=unit)
@@ -53,7 +53,7 @@ def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM
     plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
     if len(mesh.faces) == 0 or np.ptp(mesh.vertices, axis=0).min() == 0:
-        check_body(path, mesh)     # it is degenerate, which no step mends
+        check_body(path, mesh)     # it is degenerate, which no step repairs
     try:
         check_body(path, mesh)
     except InputError:
@@ -63,12 +63,12 @@ def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM
 
 
 def _mended(path, mesh, repairs):
-    """The mesh after all steps, of which each is appended to `repairs`."""
+    """The mesh after all steps; each repair is appended to `repairs`."""
     _refuse_double_sided(path, mesh)
     for step in (_join_corners, _split_at_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies):
         mesh = step(mesh, repairs)
     try:
-        refuse_folded(path, mesh)     # of the facets as read: a union may leave slits that are thinner than round-off
+        refuse_folded(path, mesh)     # before the union, which may leave slits thinner than round-off
         mesh = _unite(mesh, repairs)
         check_body(path, mesh)
     except InputError as error:
@@ -86,7 +86,7 @@ def _finite(triangles, repairs):
 
 
 def _join_corners(mesh, repairs):
-    """Corners of open edges that lie apart by round-off become one."""
+    """Merge corners of open edges that differ by round-off."""
     rim = np.unique(_open_edges(mesh))
     if not len(rim):
         return mesh
@@ -110,7 +110,7 @@ def _join_corners(mesh, repairs):
 
 
 def _split_at_corners(mesh, repairs):
-    """Facets get the corners of their neighbours that lie on their open edges."""
+    """Add to facets the corners of their neighbours that lie on their open edges."""
     edges = _open_edges(mesh)
     if not len(edges):
         return mesh
@@ -122,9 +122,9 @@ def _split_at_corners(mesh, repairs):
 
 
 def _refuse_double_sided(path, mesh):
-    """Refuse a body of which each facet is there front and back: with both sides left out, it would be left out itself.
+    """Refuse a body whose facets are all there front and back: without both sides nothing of it would remain.
 
-    One that fills a cavity of another has the cavity's facets on its back, and makes the other whole.
+    A body that fills a cavity of another one has the cavity's facets on its back; it is allowed.
     """
     keep, back_to_back = _doubles(mesh.faces)
     walls = trimesh.Trimesh(mesh.vertices, back_to_back, process=False)
@@ -140,7 +140,7 @@ def _refuse_double_sided(path, mesh):
 
 
 def _without_doubles(mesh, repairs):
-    """Of facets with the same corners one is kept; two that face each other hold nothing between them, and both go."""
+    """Keep one of facets with the same corners; remove both of two that face each other, as nothing is between them."""
     mesh = _of_faces(mesh.vertices, mesh.faces)
     keep, _ = _doubles(mesh.faces)
     if len(keep) == len(mesh.faces):
@@ -154,19 +154,19 @@ def _doubles(faces):
     _, first, which, uses = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True)
     ahead = np.zeros(len(first), dtype=int)
     np.add.at(ahead, which.ravel(), np.where(_is_even(faces), 1, -1))
-    # Facets that are all turned alike: one of them stays; as many of either side: a wall without thickness.
+    # Equally oriented facets: one of them stays; equal numbers of either side: a wall without thickness.
     walls = (uses > 1) & (ahead == 0)
     return np.sort(first[~walls]), faces[first[walls]]
 
 
 def _is_even(faces):
-    """Whether a face's corners are a turn of their rising order (n,)."""
+    """Whether a face's corners are an even permutation of their rising order (n,)."""
     a, b, c = faces.T
     return (a < b).astype(int) + (b < c) + (c < a) == 2
 
 
 def _close_holes(mesh, repairs):
-    """Flat holes, and small curved ones, are closed by a plane piece; of others the mesh stays open."""
+    """Close flat holes, and small curved ones, by plane pieces; with other holes the mesh stays open."""
     if _hangs_by_an_edge(mesh):
         return mesh
     loops = _rims(mesh)
@@ -182,12 +182,12 @@ def _close_holes(mesh, repairs):
 
 
 def _hangs_by_an_edge(mesh):
-    """Whether a facet has two open edges: the corner between them seems to be a wrong one, rather than its neighbours lost."""
+    """Whether a facet has two open edges: then the corner between them is probably wrong, rather than its neighbours missing."""
     return bool((np.bincount(mesh.edges_face[_open_rows(mesh)], minlength=1) > 1).any())
 
 
 def _rims(mesh):
-    """Closed loops of open edges, each an array of corners, against the direction of the facets beside; empty where loops meet."""
+    """Closed loops of open edges, each an array of corners, against the direction of their facets; empty where loops meet."""
     edges = _open_edges(mesh)
     following = dict(zip(edges[:, 1], edges[:, 0], strict=True))
     if not len(edges) or len(following) < len(edges) or set(following) != set(following.values()):
@@ -224,14 +224,14 @@ def _patch(mesh, loop):
 
 
 def _turn_facets(mesh, repairs):
-    """Neighbouring facets face the same side."""
+    """Orient neighbouring facets consistently."""
     if mesh.is_winding_consistent:
         return mesh
     turned = mesh.copy()
     trimesh.repair.fix_winding(turned)
     changed = (turned.faces != mesh.faces).any(axis=1)
     bodies, of = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces)), None
-    for body in range(bodies.max() + 1):     # the side of most facets is the body's
+    for body in range(bodies.max() + 1):     # the orientation of most facets is the body's
         of = bodies == body
         if changed[of].sum() > 0.5 * of.sum():
             turned.faces[of] = turned.faces[of][:, ::-1]
@@ -241,7 +241,7 @@ def _turn_facets(mesh, repairs):
 
 
 def _turn_bodies(mesh, repairs):
-    """Bodies inside out are turned; a cavity stays: it lies in a body."""
+    """Turn bodies that are inside out; cavities, which lie in a body, stay."""
     if not mesh.is_watertight or not mesh.is_winding_consistent:
         return mesh
     pieces = list(mesh.split(only_watertight=False))
@@ -258,7 +258,7 @@ def _turn_bodies(mesh, repairs):
 
 
 def _unite(mesh, repairs):
-    """Bodies that overlap or touch become one."""
+    """Unite bodies that overlap or touch."""
     if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.body_count < 2:
         return mesh
     pieces = list(mesh.split(only_watertight=False))
@@ -279,7 +279,7 @@ def _unite(mesh, repairs):
 
 
 def _open_edges(mesh):
-    """Edges (n, 2), as their facets go along them, that only one facet has."""
+    """Edges (n, 2), in the direction of their facets, that only one facet has."""
     return mesh.edges[_open_rows(mesh)]
 
 
@@ -290,7 +290,7 @@ def _open_rows(mesh):
 
 
 def _of_faces(vertices, faces):
-    """Mesh of faces, without those that have an equal corner."""
+    """Mesh of faces, without faces with equal corners."""
     a, b, c = faces.T
     mesh = trimesh.Trimesh(vertices, faces[(a != b) & (b != c) & (c != a)], process=False)
     mesh.remove_unreferenced_vertices()
@@ -313,8 +313,8 @@ def _number(count, noun):
 def split_at_corners(mesh: trimesh.Trimesh, open_edges: np.ndarray, *, tolerance: float) -> tuple[np.ndarray, int]:
     """Faces (n, 3) in which each corner that lies on an open edge of a facet is a corner of it, and how many facets were split.
 
-    open_edges : corners (k, 2) of the edges that only one facet has, as it goes along them
-    tolerance : how far in mm a corner may lie beside an edge
+    open_edges : corners (k, 2) of the edges that only one facet has, in its direction
+    tolerance : largest distance in mm of a corner from an edge
 
     The surface keeps its shape: a facet is replaced by a fan of triangles that cover it.
     """

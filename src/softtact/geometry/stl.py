@@ -1,7 +1,7 @@
-"""STL files, binary and text: every facet that the file declares, or one sentence why not.
+"""STL files, binary and text: all facets that the file declares, or a refusal in one sentence.
 
-Text: any number of solids, each from `solid` to `endsolid`, words in any case, parted by blanks and line ends alike. The facets'
-normals are not read: the order of the corners gives the side. Layout: Burns, Automated Fabrication (1993), section 6.5.
+Text: any number of solids, each from `solid` to `endsolid`, words in any case, separated by blanks or line ends. The facets'
+normals are not read: the order of the corners defines the side. Layout: Burns, Automated Fabrication (1993), section 6.5.
 """
 
 import re
@@ -14,9 +14,9 @@ from softtact.geometry.mesh_text import is_finite, is_text, line_at, no_number, 
 
 _HEADER = 84     # bytes: 80 of any text, 4 of the number of facets
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_BLANK = b" \t\r\n"     # may follow the last facet; bytes 0 there mean that something was inserted before
+_BLANK = b" \t\r\n"     # may follow the last facet; zero bytes there mean that something was inserted before
 _WORDS = [b"facet", b"normal", None, None, None, b"outer", b"loop", *3 * [b"vertex", float, float, float], b"endloop", b"endfacet"]
-_NUMBERS = [k for k, due in enumerate(_WORDS) if due is float]
+_NUMBERS = [k for k, expected in enumerate(_WORDS) if expected is float]
 _PIECE = 1_000_000     # bytes of a text that are split into words at once
 _SOLID = re.compile(rb"\s*solid(?!\S)[^\n]*")
 _AGAIN = "export the mesh again."
@@ -34,9 +34,9 @@ def read_stl(path: Path) -> np.ndarray:
 def _read_binary(path, data, declared):
     end = _HEADER + _FACET.itemsize * declared
     if len(data) < end or data[end:].strip(_BLANK):
-        why = "was cut off" if len(data) < end else "holds more than it declares"
+        fault = "was cut off" if len(data) < end else "holds more than it declares"
         raise InputError(f"{path}: as a binary STL it declares {declared} facets, which take {end} bytes, but has {len(data)}, "
-                         f"so it {why}; {_AGAIN}")
+                         f"so it {fault}; {_AGAIN}")
     return np.frombuffer(data, _FACET, count=declared, offset=_HEADER)["corners"].astype(float)
 
 
@@ -71,18 +71,18 @@ def _facets(path, data, at, end):
 
 
 def _numbers(words):
-    """Corners (k, 3, 3) of facets in words; None where one is no finite number."""
+    """Corners (k, 3, 3) of facets in words; None where one is not a finite number."""
     columns = [words[k::len(_WORDS)] for k in _NUMBERS]
     try:
         corners = np.array([list(map(float, column)) for column in columns]).T.reshape(-1, 3, 3)
     except ValueError:
         return None
-    strange = any(b"_" in b"".join(column) for column in columns)     # Python would take 1_0 for a number
+    strange = any(b"_" in b"".join(column) for column in columns)     # Python reads 1_0 as a number
     return None if strange or not np.isfinite(corners).all() else corners
 
 
 def _fault(path, data, at):
-    """The refusal of the first word of the facets from a byte on that is not the one that is due."""
+    """The refusal of the first unexpected word of the facets from a byte on."""
     for number, word in enumerate(re.compile(rb"\S+").finditer(data, at)):
         due = _WORDS[number % len(_WORDS)]
         if word.end() == len(data) and word.group() != b"endsolid":

@@ -1,8 +1,8 @@
-"""Tetrahedra that fill a closed surface, by fTetWild, and what a surface must be for it.
+"""Tetrahedra that fill a closed surface, by fTetWild, and checks of the surface.
 
 fTetWild: Hu, Schneider, Wang, Zorin and Panozzo, ACM Trans. Graph. 39 (2020) 117, through the package `pytetwild`. It keeps the
-tetrahedra's outside within an envelope around the given surface. It takes its facets in random order, without a seed that could be
-set: a repetition gives another mesh, as good. For the same numbers keep the mesh's file.
+tetrahedra's outside within an envelope around the given surface. It takes the facets in random order, and its seed cannot be set: a
+repetition gives another mesh of the same quality. To repeat the same numbers, keep the mesh file.
 """
 
 import math
@@ -14,13 +14,13 @@ import trimesh
 from softtact.errors import InputError, how_to_install
 from softtact.geometry.meshes import volume_of
 
-ELEMENTS_PER_CUBE = 13     # in a cube whose sides are the size: measured 10 to 30, fewest where the size is small against the body
-_CORNER_SHARE = 0.5        # of its quality that a tetrahedron may lose where a corner of it moves onto the surface
-_SHARP = np.radians(30)    # angle between facets from which their edge is one of the body
+ELEMENTS_PER_CUBE = 13     # in a cube of the element size: measured 10 to 30, least where the size is small against the body
+_CORNER_SHARE = 0.5        # of its quality that a tetrahedron may lose when one of its corners is moved onto the surface
+_SHARP = np.radians(30)    # angle between facets from which their edge is an edge of the body
 
 
 def estimated_elements(surface: trimesh.Trimesh, size_mm: float) -> int:
-    """About how many tetrahedra fill a closed surface at an edge length in mm: right to a factor of two."""
+    """Estimated number of tetrahedra that fill a closed surface at an edge length in mm, within a factor of two."""
     return math.ceil(ELEMENTS_PER_CUBE * volume_of(surface) / size_mm**3)
 
 
@@ -66,7 +66,7 @@ def _refuse_self_intersecting(surface, name):
 def fill(surface: trimesh.Trimesh, *, size_mm: float, envelope_mm: float, threads: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) in mm and tetrahedra (e, 4), of positive volume, that fill a closed surface (mm).
 
-    size_mm: edge length aimed at;  envelope_mm: how far the outside may be from the surface before corners are moved onto it
+    size_mm: desired edge length;  envelope_mm: largest distance of the outside from the surface before corners are moved onto it
     """
     _, pytetwild = _programs()
     diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
@@ -89,7 +89,7 @@ def fill(surface: trimesh.Trimesh, *, size_mm: float, envelope_mm: float, thread
 
 
 def _moved(points, tetrahedra, corners, places):
-    """The points with corners (k,) moved to places (k, 3), but for those whose tetrahedra that would spoil."""
+    """The points with corners (k,) moved to places (k, 3), except corners whose tetrahedra would lose too much quality."""
     moved, before = points.copy(), quality(points[tetrahedra])
     moved[corners] = places
     while (spoilt := quality(moved[tetrahedra]) < _CORNER_SHARE * before).any():
@@ -106,8 +106,8 @@ def outer_corners(tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def quality(corners: np.ndarray) -> np.ndarray:
-    """Mean ratio (e,) of tetrahedra with corners (e, 4, 3): 12 (3 V)^(2/3) / sum of squared edges, 1 of a regular one, 0 of a flat
-    one, negative of an inverted one. (Liu and Joe, BIT 34 (1994) 268.)
+    """Mean ratio (e,) of tetrahedra with corners (e, 4, 3): 12 (3 V)^(2/3) / sum of squared edges; 1 for a regular, 0 for a flat,
+    negative for an inverted one. (Liu and Joe, BIT 34 (1994) 268.)
     """
     one, other = np.triu_indices(4, 1)
     squares = ((corners[:, one] - corners[:, other]) ** 2).sum(axis=(1, 2))
@@ -122,7 +122,7 @@ class ClosestPoints:
         self._facets = _poly(_programs()[0], points, facets)
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
-        """(k, 3) for places (k, 3)."""
+        """Closest points (k, 3) of places (k, 3)."""
         return np.asarray(self._facets.find_closest_cell(np.ascontiguousarray(places), return_closest_point=True)[1])
 
 

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 
 class BlockTridiagonalSolver:
-    """The interface of `softtact.linalg.direct`."""
+    """A direct solver with the interface of `softtact.linalg.direct`."""
 
     name = "block tridiagonal Cholesky"
 
@@ -31,15 +31,15 @@ class BlockTridiagonalSolver:
         blocks = self._blocks
         found = np.array(right, dtype=float).reshape(len(right), -1)[blocks.order]
         for number, (factor, coupling) in enumerate(self._factors):
-            own = blocks.parts[number]
-            found[own] = _lower(factor, found[own])
+            layer = blocks.parts[number]
+            found[layer] = _lower(factor, found[layer])
             if coupling is not None:
                 found[blocks.parts[number + 1]] -= coupling.T @ found[blocks.tail(number)]
         for number, (factor, coupling) in reversed(list(enumerate(self._factors))):
-            own = blocks.parts[number]
+            layer = blocks.parts[number]
             if coupling is not None:
                 found[blocks.tail(number)] -= coupling @ found[blocks.parts[number + 1]]
-            found[own] = sla.solve_triangular(factor, found[own], lower=True, trans="T", check_finite=False)
+            found[layer] = sla.solve_triangular(factor, found[layer], lower=True, trans="T", check_finite=False)
         out = np.empty_like(found)
         out[blocks.order] = found
         return out.reshape(right.shape)
@@ -69,10 +69,11 @@ class _Blocks:
         return slice(stop - self._tails[number], stop)
 
     def factors(self):
-        """(L_i, C_i) of the layers in turn, C_i by its nonzero rows, None for the last; stops at an indefinite block."""
+        """(L_i, C_i) of one layer after the other, C_i by its nonzero rows, None for the last; stops at an indefinite block."""
         update = 0.0
-        for number, own in enumerate(self.parts):
-            factor, fault = sla.lapack.dpotrf(np.asfortranarray(self._ordered[own, own].toarray() - update), lower=1, overwrite_a=1)
+        for number, layer in enumerate(self.parts):
+            diagonal = np.asfortranarray(self._ordered[layer, layer].toarray() - update)
+            factor, fault = sla.lapack.dpotrf(diagonal, lower=1, overwrite_a=1)
             if fault:
                 return
             if number + 1 == len(self.parts):
@@ -86,16 +87,16 @@ class _Blocks:
 
 
 def layers(matrix: sp.csr_matrix) -> np.ndarray:
-    """Layer (n,) of each unknown of a symmetric sparse matrix: its distance from one end of its part of the matrix' graph."""
+    """Layer (n,) of each unknown of a symmetric sparse matrix: its distance from one end of its component of the matrix' graph."""
     graph = sp.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
-    _, part = connected_components(graph, directed=False)
+    _, component = connected_components(graph, directed=False)
     out, offset = np.empty(matrix.shape[0], dtype=int), 0
-    for own in range(part.max() + 1):
-        members = np.flatnonzero(part == own)
-        own_graph = graph[members][:, members]
-        distance = _distance(own_graph, [0])
-        for _ in range(2):     # from the far end as a whole: from one point layers would bend
-            distance = _distance(own_graph, np.flatnonzero(distance == distance.max()))
+    for number in range(component.max() + 1):
+        members = np.flatnonzero(component == number)
+        within = graph[members][:, members]
+        distance = _distance(within, [0])
+        for _ in range(2):     # from all unknowns of the far end: from a single one, layers would be curved
+            distance = _distance(within, np.flatnonzero(distance == distance.max()))
         out[members] = distance + offset
         offset += distance.max() + 1
     return out

@@ -1,7 +1,7 @@
 """One small interface to sparse direct solvers for symmetric matrices: analyse once, factor often.
 
-PARDISO (MKL) where it is installed, dense blocks of LAPACK elsewhere; `solver.name` is that of the one in use. A press takes
-`multifrontal_solver`, which knows the places of the unknowns.
+PARDISO (MKL) where it is installed, dense blocks of LAPACK elsewhere; `solver.name` names the one in use. A press takes
+`multifrontal_solver`, which uses the positions of the unknowns.
 
 PARDISO's Cholesky factor in single precision takes half the time and memory, for steps that are corrected by a residual in double
 precision. It suffices where the matrix's condition stays well below 1e7; else these steps do not reduce the residual.
@@ -31,9 +31,10 @@ def make_solver(*, threads: int = 1) -> "PardisoSolver | BlockTridiagonalSolver"
 
 
 def _pypardiso(mtype):
-    """A solver of pypardiso's, which looks for MKL in all folders each time, a second or so, unless its place is given."""
+    """A solver of pypardiso, which searches all folders for MKL each time (about a second) unless its path is given."""
     from pypardiso import PyPardisoSolver
 
+    point_at_mkl()
     solver = PyPardisoSolver(mtype=mtype)
     os.environ.setdefault("PYPARDISO_MKL_RT", solver.libmkl._name)
     return solver
@@ -45,8 +46,8 @@ class PardisoSolver:
     name = "pardiso"
     precision: type[np.floating] = np.float64
     _POSITIVE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR, _NO_MEMORY = 2, 22, 33, 12, -2
-    # Entries of iparm, counted from 0: stated values, METIS on one thread (the same order whatever the number of threads), and no
-    # iterative refinement, which makes a solve four times as long for digits that Newton's method does not need.
+    # Entries of iparm, counted from 0: no default values, METIS on one thread (the same order whatever the number of threads), and
+    # no iterative refinement, which makes a solve four times as long for digits that Newton's method does not need.
     _PARAMETERS = {0: 1, 1: 2, 7: 0, 17: -1, 18: -1}
     _FROM_ZERO = 34     # the entry of iparm that lets rows and columns be counted from 0
     _pattern: tuple[np.ndarray, np.ndarray] | None
@@ -64,7 +65,7 @@ class PardisoSolver:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
         pattern = (upper.indptr, upper.indices)
         if any(array.dtype != np.int32 for array in pattern):
-            raise TypeError(f"PARDISO takes places of 32 bits, not {upper.indptr.dtype} and {upper.indices.dtype}.")
+            raise TypeError(f"PARDISO takes indices of 32 bits, not {upper.indptr.dtype} and {upper.indices.dtype}.")
         upper = self._upper = self._in_precision(upper)
         same = self._pattern is not None and all(a is b for a, b in zip(pattern, self._pattern, strict=True))
         _, fault = self._call(self._FACTOR if same else self._ANALYSE_AND_FACTOR, np.zeros((upper.shape[0], 1), self.precision))
@@ -94,8 +95,8 @@ class PardisoSolver:
     def _call(self, phase, columns):
         """PARDISO's solution for columns (n, k), in Fortran's order, and its error.
 
-        On `threads` threads, whatever limit holds for the small products around it. Not by pypardiso's call, which
-        copies the pattern twice each time: half of the time of a solve.
+        It runs on `threads` threads, whatever limit holds for the small products around it. The call of pypardiso is avoided: it
+        copies the pattern twice each time, which takes half of the time of a solve.
         """
         solver, upper = self._solver, self._upper
         found, fault = np.empty_like(columns), ctypes.c_int32(0)
@@ -117,7 +118,7 @@ class PardisoSolver:
 
 
 class SuperLUSolver:
-    """scipy's SuperLU: slow, but for any matrix and on any machine; what the other solvers are held against."""
+    """scipy's SuperLU: slow, but for any matrix and on any machine; the reference for the other solvers."""
 
     name = "superlu"
 
@@ -139,15 +140,14 @@ class SuperLUSolver:
 
 
 class PardisoSingle(PardisoSolver):
-    """The interface of `linear_solvers`, with factors and solutions of about seven digits."""
+    """A `PardisoSolver` with factors and solutions of about seven digits."""
 
     name = "pardiso, single precision"
     precision = np.float32
 
     def __init__(self, *, threads: int = 1, quick_analysis: bool = False) -> None:
-        """quick_analysis: order by minimum degree: on a layer of small elements as little fill as dissection, in two thirds of
-        the time; on cells of many unknowns half as many operations more."""
-        point_at_mkl()
+        """quick_analysis: order by minimum degree: for a layer of small elements as little fill as by dissection, in two thirds of
+        the time; for cells of many unknowns half as many operations more."""
         super().__init__(threads=threads)
         self._solver.set_iparm(_SINGLE, 1)
         if quick_analysis:
@@ -160,9 +160,9 @@ class PardisoSingle(PardisoSolver):
 
 
 def point_at_mkl() -> None:
-    """Give pypardiso the place of MKL: its search through the installation takes half a second for every solver.
+    """Give pypardiso the path of MKL, as its search through the installation takes half a second for each solver.
 
-    Where no package `mkl` is installed, it is left to that search, or to the solver that takes PARDISO's place.
+    Where no package `mkl` is installed, pypardiso searches; where it finds none, another solver takes PARDISO's place.
     """
     if "PYPARDISO_MKL_RT" not in os.environ:
         try:

@@ -4,11 +4,11 @@ Compiled loops call scipy's LAPACK and BLAS for thousands of small matrices with
 addresses of the routines that it needs as arguments: numba caches it then, which it would not with an address in it. (Numba's type
 for functions as arguments takes 20 us to recognise at every call; a number takes none.)
 
-Loops over one row, in single precision or in 16 bits, are what a triangular solve does, row by row. As separate functions they
-become vector instructions and read at nearly memory's speed. Loops over several rows at once do not, and BLAS's triangular solves
+A triangular solve goes row by row, in single precision or in 16 bits. As separate functions these loops over one row are compiled
+to vector instructions and read at nearly the speed of memory. Loops over several rows at once are not, and BLAS's triangular solves
 of some hundred unknowns take four times as long (docs/notebook/2026-11-25-linear-solver.md).
 
-SciPy's BLAS may start threads or not, as its user has set it; Cholesky's method uses the caller's threads, each on other blocks.
+SciPy's BLAS uses as many threads as its user has set. Cholesky's method here uses the caller's threads, each on other blocks.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def _address_of(module, name):
 
 
 class Routines(NamedTuple):
-    """The routines' addresses, and their constant arguments in memory: letters L, N, R, T; factors 1, -1, 0."""
+    """The routines' addresses, and their constant arguments in memory: letters L, N, R, T, and factors 1, -1, 0."""
 
     letters: np.ndarray
     factors: np.ndarray
@@ -48,7 +48,7 @@ ROUTINES = Routines(letters=np.array([ord(letter) for letter in "LNRT"], dtype=n
 
 @intrinsic
 def call(typing_context: Any, routine: types.Type, arguments: types.BaseTuple) -> tuple[Any, Callable[..., Any]]:
-    """Call a routine by its address with a tuple of arguments, each an address itself, as in Fortran."""
+    """Call a routine by its address with a tuple of arguments, each of them an address as well, as in Fortran."""
     def generate(context, builder, signature, values):
         word = ir.IntType(64)
         function = ir.FunctionType(ir.VoidType(), [word] * len(signature.args[1]))
@@ -67,7 +67,7 @@ def address(array: np.ndarray, place: int) -> np.uintp:
 
 @njit(cache=True, nogil=True, inline="never")
 def keep_alive(array: np.ndarray) -> np.number:
-    """Use an array that a routine was pointed at: until here it must not be freed."""
+    """Use an array whose address a routine was given, so that it is not freed before."""
     return array[0]
 
 
@@ -91,16 +91,17 @@ def factor_in_place(matrix: np.ndarray, *, workers: Workers = SERIAL) -> bool:
     """Overwrite the upper triangle of a matrix A (n, n), row by row, by R of A = R'.R; False if A is not positive definite."""
     size = len(matrix)
     for block in slices(size, _BLOCK):
-        if not _begin(matrix, block.start, block.stop, ROUTINES):
+        if not _factor_diagonal(matrix, block.start, block.stop, ROUTINES):
             return False
         rest = [(block.stop + part.start, block.stop + part.stop) for part in slices(size - block.stop, _BLOCK)]
-        workers.map(lambda part, b=block: _couple(matrix, b.start, b.stop, *part, ROUTINES), rest)     # type: ignore[misc, call-arg]
-        workers.map(lambda part, b=block: _update(matrix, b.start, b.stop, *part, ROUTINES), rest)     # type: ignore[misc, call-arg]
+        workers.map(lambda part, b=block: _solve_rows(matrix, b.start, b.stop, *part, ROUTINES), rest)     # type: ignore[misc, call-arg]
+        workers.map(lambda part, b=block: _update_rows(matrix, b.start, b.stop, *part, ROUTINES), rest)     # type: ignore[misc, call-arg]
     return True
 
 
 @njit(cache=True, nogil=True)
-def _begin(matrix, start, stop, blas):
+def _factor_diagonal(matrix, start, stop, blas):
+    """Factor the diagonal block from `start` to `stop`; False if it is not positive definite."""
     letters = blas.letters
     size = np.array([stop - start, len(matrix), 0], dtype=np.int32)
     corner = matrix[start:, start:].ctypes.data
@@ -109,8 +110,8 @@ def _begin(matrix, start, stop, blas):
 
 
 @njit(cache=True, nogil=True)
-def _couple(matrix, start, stop, first, end, blas):
-    """Columns from `first` to `end` of the rows from `start` to `stop`."""
+def _solve_rows(matrix, start, stop, first, end, blas):
+    """The factor's rows from `start` to `stop` in the columns from `first` to `end`."""
     letters, factors = blas.letters, blas.factors
     size = np.array([stop - start, len(matrix), end - first], dtype=np.int32)
     call(blas.trsm, (address(letters, 2), address(letters, 0), address(letters, 3), address(letters, 1), address(size, 2),
@@ -120,8 +121,8 @@ def _couple(matrix, start, stop, first, end, blas):
 
 
 @njit(cache=True, nogil=True)
-def _update(matrix, start, stop, first, end, blas):
-    """Subtract from the rows from `first` to `end` what the rows from `start` to `stop` give."""
+def _update_rows(matrix, start, stop, first, end, blas):
+    """Subtract from the rows from `first` to `end` their product with the factor's rows from `start` to `stop`."""
     letters, factors = blas.letters, blas.factors
     size = np.array([stop - start, len(matrix), end - first, len(matrix) - end], dtype=np.int32)
     L, N, T, minus_one, one = (address(letters, 0), address(letters, 1), address(letters, 3), address(factors, 1),

@@ -1,13 +1,13 @@
 """Cholesky's method on the fronts of a dissection, in single precision: compiled loops around BLAS and LAPACK.
 
-A piece's front is a dense matrix over its k unknowns and the b later ones that they are coupled with. Its panel are the first
-k rows (k, k + b), in the end the factor's; its update is what is left of the others (b, b), which later fronts take over (Duff and
-Reid, ACM Trans. Math. Softw. 9, 1983). Of both only the upper triangle counts, row by row; to Fortran that is a lower one.
+A piece's front is a dense matrix over its k pivots, the unknowns that it eliminates, and its boundary: the b later unknowns that
+they are coupled with. Its panel is the first k rows (k, k + b), which become rows of the factor. Its update is what remains of the
+other rows (b, b), which later fronts add to theirs (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). Of both only the upper
+triangle is used, row by row; to Fortran that is a lower one.
 
-A solve reads the factor twice and does little else. So the panels' bound columns are kept in 16 bits, as shares of each row's
+A solve reads the factor twice and does little else. So the panels' boundary columns are stored in 16 bits, as shares of each row's
 largest entry: half as much to read, and a solution off by 3e-4 of its energy norm, where single precision leaves 6e-6. It goes
-through them row by row: loops over several rows at once are not made of vector instructions, and BLAS's own triangular solves
-read a quarter as fast (`row_loops`).
+through them row by row, for the reason in `lapack`.
 """
 
 from collections import namedtuple
@@ -17,20 +17,21 @@ from numba import njit
 
 from softtact.linalg.lapack import Routines, add_row, address, call, keep_alive, row_product
 
-# Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
-#   own_at (p + 1,): its unknowns;  bound_at (p + 1,), bound: later unknowns of its front, rising
-#   child_at (p + 1,), child: pieces whose updates it takes over
-#   place: where its bound stand in the front that takes over its update
-#   entry_at (p + 1,), source, target: which of the matrix' values are its own, and where in its panel they stand
-#   triangle_at, short_at (p + 1,): its own triangle, row after row (k (k + 1) / 2,), its panel's bound columns (k, b) in 16 bits
-#   panel_at, update_at (p,): where in `work` its panel and its update are
-Fronts = namedtuple("Fronts", "own_at bound_at bound child_at child place entry_at source target triangle_at short_at panel_at "
-                              "update_at")
-#   work: panels and updates, each as long as it is needed;  triangles, short: as above, flat; diagonals are inverted
-#   scale (n,): what a unit in a row of `short` stands for
+# Arrays of all pieces, concatenated: those of piece p go from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
+#   pivot_at (p + 1,): its pivots;  boundary_at (p + 1,), boundary: the later unknowns of its front, rising
+#   child_at (p + 1,), child: pieces whose updates are added to its front
+#   place: rows of its boundary in the front that its update is added to
+#   entry_at (p + 1,), source, target: numbers of the matrix' values that belong to its panel, and their places in it
+#   triangle_at, short_at (p + 1,): the triangle of its pivots, row after row (k (k + 1) / 2,), and its panel's boundary columns
+#   (k, b) in 16 bits
+#   panel_at, update_at (p,): where in `work` its panel and its update begin
+Fronts = namedtuple("Fronts", "pivot_at boundary_at boundary child_at child place entry_at source target triangle_at short_at "
+                              "panel_at update_at")
+#   work: panels and updates while they are needed;  triangles, short: as above, flat; diagonals are inverted
+#   scale (n,): value of a unit in a row of `short`
 Store = namedtuple("Store", "work triangles short scale")
 
-_LONGEST = 32767                     # of a number in 16 bits
+_LONGEST = 32767                     # number in 16 bits
 
 
 @njit(cache=True, nogil=True)
@@ -40,119 +41,119 @@ def factor_pieces(pieces: np.ndarray, fronts: Fronts, store: Store, values: np.n
     blas: `lapack.Routines`
     """
     for p in pieces:
-        if not begin(p, fronts, store, values, blas):
+        if not factor_pivots(p, fronts, store, values, blas):
             return False
-        bound = fronts.bound_at[p + 1] - fronts.bound_at[p]
-        couple(p, 0, bound, fronts, store, blas)
-        keep(p, fronts, store)
-        update(p, 0, bound, fronts, store, blas)
+        boundary = fronts.boundary_at[p + 1] - fronts.boundary_at[p]
+        solve_columns(p, 0, boundary, fronts, store, blas)
+        store_panel(p, fronts, store)
+        update_rows(p, 0, boundary, fronts, store, blas)
     return True
 
 
 @njit(cache=True, nogil=True)
-def sum_up(p: int, fronts: Fronts, store: Store, values: np.ndarray) -> None:
-    """Sum up a piece's panel (k, k + b): the matrix' values, and what earlier pieces have left."""
-    own, width = _shape(p, fronts)
+def assemble_panel(p: int, fronts: Fronts, store: Store, values: np.ndarray) -> None:
+    """Sum up a piece's panel (k, k + b): the matrix' values, and the updates of earlier pieces."""
+    pivots, width = _shape(p, fronts)
     panel = _panel_of(p, fronts, store)
     panel[:] = 0.0
     for e in range(fronts.entry_at[p], fronts.entry_at[p + 1]):
         panel[fronts.target[e]] = values[fronts.source[e]]
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        _take_over(c, 0, own, fronts, store, panel, 0, width)
+        _extend_add(c, 0, pivots, fronts, store, panel, 0, width)
 
 
 @njit(cache=True, nogil=True)
-def begin(p: int, fronts: Fronts, store: Store, values: np.ndarray, blas: Routines) -> bool:
-    """`sum_up` a piece's panel, and factor its own unknowns; False if they are not positive definite."""
-    sum_up(p, fronts, store, values)
-    own, width = _shape(p, fronts)
-    if own == 0:     # a cut where nothing is coupled
+def factor_pivots(p: int, fronts: Fronts, store: Store, values: np.ndarray, blas: Routines) -> bool:
+    """Assemble a piece's panel and factor the triangle of its pivots; False if that is not positive definite."""
+    assemble_panel(p, fronts, store, values)
+    pivots, width = _shape(p, fronts)
+    if pivots == 0:     # a cut where nothing is coupled
         return True
     panel = _panel_of(p, fronts, store)
-    size = np.array([own, width, 0], dtype=np.int32)
+    size = np.array([pivots, width, 0], dtype=np.int32)
     call(blas.potrf, (address(blas.letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2)))     # type: ignore[call-arg, arg-type]
-    # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
-    return size[2] == 0 and np.isfinite(panel[(own - 1) * (width + 1)])
+    # BLAS libraries differ in whether they report a nan; it reaches the last pivot.
+    return size[2] == 0 and np.isfinite(panel[(pivots - 1) * (width + 1)])
 
 
 @njit(cache=True, nogil=True)
-def couple(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
-    """The panel's columns from `start` to `end` of the bound unknowns."""
-    own, width = _shape(p, fronts)
-    if own == 0 or start == end:
+def solve_columns(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
+    """Make the panel's boundary columns from `start` to `end` those of the factor."""
+    pivots, width = _shape(p, fronts)
+    if pivots == 0 or start == end:
         return
     panel = _panel_of(p, fronts, store)
-    size = np.array([own, width, end - start], dtype=np.int32)
+    size = np.array([pivots, width, end - start], dtype=np.int32)
     letters, factors = blas.letters, blas.factors
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
     call(blas.trsm, (R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),     # type: ignore[call-arg, arg-type]
-                address(panel, own + start), address(size, 1)))
+                address(panel, pivots + start), address(size, 1)))
     keep_alive(size)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def keep(p: int, fronts: Fronts, store: Store) -> None:
-    """Keep what a solve needs of a panel: the own triangle, the bound columns in 16 bits, and the size of a unit in each row."""
-    own, width = _shape(p, fronts)
-    bound, panel = width - own, _panel_of(p, fronts, store)
+def store_panel(p: int, fronts: Fronts, store: Store) -> None:
+    """Store what a solve needs of a panel: the triangle of the pivots, the boundary columns in 16 bits, and each row's unit."""
+    pivots, width = _shape(p, fronts)
+    boundary, panel = width - pivots, _panel_of(p, fronts, store)
     triangle, at = _triangle_of(p, fronts, store), 0
-    for k in range(own):
+    for k in range(pivots):
         triangle[at] = np.float32(1.0) / panel[k * width + k]
-        triangle[at + 1:at + own - k] = panel[k * width + k + 1:k * width + own]
-        at += own - k
-    for k in range(own):
-        row = panel[k * width + own:(k + 1) * width]
-        out = store.short[fronts.short_at[p] + k * bound:fronts.short_at[p] + (k + 1) * bound]
+        triangle[at + 1:at + pivots - k] = panel[k * width + k + 1:k * width + pivots]
+        at += pivots - k
+    for k in range(pivots):
+        row = panel[k * width + pivots:(k + 1) * width]
+        out = store.short[fronts.short_at[p] + k * boundary:fronts.short_at[p] + (k + 1) * boundary]
         largest = np.float32(0.0)
-        for j in range(bound):
+        for j in range(boundary):
             largest = max(largest, abs(row[j]))
         per_unit = np.float32(_LONGEST) / max(largest, np.float32(1e-30))
-        for j in range(bound):
+        for j in range(boundary):
             out[j] = np.int16(np.rint(row[j] * per_unit))
-        store.scale[fronts.own_at[p] + k] = np.float32(1.0) / per_unit
+        store.scale[fronts.pivot_at[p] + k] = np.float32(1.0) / per_unit
 
 
 @njit(cache=True, nogil=True)
-def update(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
-    """The update's rows from `start` to `end`."""
+def update_rows(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
+    """Compute the update's rows from `start` to `end`."""
     if start == end:
         return
-    own, width = _shape(p, fronts)
-    bound, panel, out = width - own, _panel_of(p, fronts, store), _update_of(p, fronts, store)
-    size = np.array([own, width, end - start, bound, bound - end], dtype=np.int32)
+    pivots, width = _shape(p, fronts)
+    boundary, panel, out = width - pivots, _panel_of(p, fronts, store), _update_of(p, fronts, store)
+    size = np.array([pivots, width, end - start, boundary, boundary - end], dtype=np.int32)
     letters, factors = blas.letters, blas.factors
     L, N, T = address(letters, 0), address(letters, 1), address(letters, 3)
-    minus_one, zero, rows = address(factors, 1), address(factors, 2), address(panel, own + start)
+    minus_one, zero, rows = address(factors, 1), address(factors, 2), address(panel, pivots + start)
     call(blas.syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero,     # type: ignore[call-arg, arg-type]
-                address(out, start * bound + start), address(size, 3)))
-    if bound > end:
-        call(blas.gemm, (N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
-                    address(size, 1), rows, address(size, 1), zero, address(out, start * bound + end), address(size, 3)))
+                address(out, start * boundary + start), address(size, 3)))
+    if boundary > end:
+        call(blas.gemm, (N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, pivots + end),
+                    address(size, 1), rows, address(size, 1), zero, address(out, start * boundary + end), address(size, 3)))
     keep_alive(size)
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        _take_over(c, own + start, own + end, fronts, store, out, own, bound)
+        _extend_add(c, pivots + start, pivots + end, fronts, store, out, pivots, boundary)
 
 
 @njit(cache=True, nogil=True)
-def _take_over(c, start, end, fronts, store, out, skipped, width):
-    """Add the rows of a piece's update that stand from `start` to `end` in a front.
+def _extend_add(c, start, end, fronts, store, out, skipped, width):
+    """Add the rows of a piece's update that belong to the rows from `start` to `end` of a front.
 
-    out: the front's rows, `width` wide, without those and the columns that are `skipped`
+    out: the front's rows, `width` wide, without the first `skipped` rows and columns
     """
-    place, given = _bound_of(c, fronts, fronts.place), _update_of(c, fronts, store)
-    bound, runs = len(place), runs_of(place)
+    place, child_update = _boundary_of(c, fronts, fronts.place), _update_of(c, fronts, store)
+    boundary, runs = len(place), runs_of(place)
     for i in range(np.searchsorted(place, start), np.searchsorted(place, end)):
         row = (place[i] - skipped) * width - skipped
         for r in range(len(runs) - 1):
             first, last = max(runs[r], i), runs[r + 1]
             if first < last:
                 to = row + place[first]
-                out[to:to + last - first] += given[i * bound + first:i * bound + last]
+                out[to:to + last - first] += child_update[i * boundary + first:i * boundary + last]
 
 
 @njit(cache=True, nogil=True)
 def runs_of(places: np.ndarray) -> np.ndarray:
-    """Where places (k,) begin that do not follow on the ones before, and the end."""
+    """Where runs of consecutive places begin among places (k,), and the end."""
     starts = np.empty(len(places) + 1, np.int64)
     count = 0
     for k in range(len(places)):
@@ -165,36 +166,36 @@ def runs_of(places: np.ndarray) -> np.ndarray:
 
 @njit(cache=True, nogil=True)
 def forward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray, beyond: np.ndarray, first: int) -> None:
-    """Eliminate the pieces' unknowns from a right-hand side (n,), in place.
+    """Forward substitution with the pieces for a right-hand side (n,), in place.
 
-    What is left on unknowns from `first` on, which other pieces may change at the same time, goes to `beyond`.
+    Contributions to unknowns from `first` on, which other pieces may change at the same time, go to `beyond`.
     """
     for p in pieces:
-        bound, x, rows = _bound_of(p, fronts, fronts.bound), _own_of(p, fronts, right), _short_of(p, fronts, store)
-        _eliminate_own(_triangle_of(p, fronts, store), x)
-        scale, b, passed_on = _own_of(p, fronts, store.scale), len(bound), np.zeros(len(bound), np.float32)
+        boundary, x, rows = _boundary_of(p, fronts, fronts.boundary), _pivots_of(p, fronts, right), _short_of(p, fronts, store)
+        _solve_transposed(_triangle_of(p, fronts, store), x)
+        scale, b, passed_on = _pivots_of(p, fronts, store.scale), len(boundary), np.zeros(len(boundary), np.float32)
         for k in range(len(x)):
             add_row(rows[k * b:(k + 1) * b], x[k] * scale[k], passed_on)
         for i in range(b):
-            if bound[i] < first:
-                right[bound[i]] -= passed_on[i]
+            if boundary[i] < first:
+                right[boundary[i]] -= passed_on[i]
             else:
-                beyond[bound[i] - first] -= passed_on[i]
+                beyond[boundary[i] - first] -= passed_on[i]
 
 
 @njit(cache=True, nogil=True)
 def backward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray) -> None:
-    """The pieces' unknowns, from the last on, in place; later ones are known."""
+    """Back substitution with the pieces from the last on, in place; later unknowns are known."""
     for p in pieces[::-1]:
-        x, known, rows = _own_of(p, fronts, right), right[_bound_of(p, fronts, fronts.bound)], _short_of(p, fronts, store)
-        scale, b = _own_of(p, fronts, store.scale), len(known)
+        x, known, rows = _pivots_of(p, fronts, right), right[_boundary_of(p, fronts, fronts.boundary)], _short_of(p, fronts, store)
+        scale, b = _pivots_of(p, fronts, store.scale), len(known)
         for k in range(len(x)):
             x[k] -= scale[k] * row_product(rows[k * b:(k + 1) * b], known)
-        _recover_own(_triangle_of(p, fronts, store), x)
+        _solve_triangle(_triangle_of(p, fronts, store), x)
 
 
 @njit(cache=True, nogil=True)
-def _eliminate_own(triangle, x):
+def _solve_transposed(triangle, x):
     """Solve R'.y = x (k,) in place for a triangle R, row after row with its diagonal inverted."""
     at = 0
     for k in range(len(x)):
@@ -205,7 +206,7 @@ def _eliminate_own(triangle, x):
 
 
 @njit(cache=True, nogil=True)
-def _recover_own(triangle, x):
+def _solve_triangle(triangle, x):
     """Solve R.y = x (k,) in place."""
     at = len(triangle)
     for k in range(len(x) - 1, -1, -1):
@@ -216,33 +217,33 @@ def _recover_own(triangle, x):
 
 @njit(cache=True, nogil=True)
 def _shape(p, fronts):
-    """How many unknowns a piece eliminates, and how many its front has."""
-    own = fronts.own_at[p + 1] - fronts.own_at[p]
-    return own, own + fronts.bound_at[p + 1] - fronts.bound_at[p]
+    """Number of a piece's pivots, and of all unknowns of its front."""
+    pivots = fronts.pivot_at[p + 1] - fronts.pivot_at[p]
+    return pivots, pivots + fronts.boundary_at[p + 1] - fronts.boundary_at[p]
 
 
 @njit(cache=True, nogil=True)
 def _panel_of(p, fronts, store):
-    own, width = _shape(p, fronts)
-    return store.work[fronts.panel_at[p]:fronts.panel_at[p] + own * width]
+    pivots, width = _shape(p, fronts)
+    return store.work[fronts.panel_at[p]:fronts.panel_at[p] + pivots * width]
 
 
 @njit(cache=True, nogil=True)
 def _update_of(p, fronts, store):
-    bound = fronts.bound_at[p + 1] - fronts.bound_at[p]
-    return store.work[fronts.update_at[p]:fronts.update_at[p] + bound * bound]
+    boundary = fronts.boundary_at[p + 1] - fronts.boundary_at[p]
+    return store.work[fronts.update_at[p]:fronts.update_at[p] + boundary * boundary]
 
 
 @njit(cache=True, nogil=True)
-def _own_of(p, fronts, values):
-    """Those of a piece's own unknowns, of values (n,)."""
-    return values[fronts.own_at[p]:fronts.own_at[p + 1]]
+def _pivots_of(p, fronts, values):
+    """The part of values (n,) that belongs to a piece's pivots."""
+    return values[fronts.pivot_at[p]:fronts.pivot_at[p + 1]]
 
 
 @njit(cache=True, nogil=True)
-def _bound_of(p, fronts, values):
-    """Those of a piece's bound unknowns, of values as `bound`."""
-    return values[fronts.bound_at[p]:fronts.bound_at[p + 1]]
+def _boundary_of(p, fronts, values):
+    """The part of values, concatenated as `boundary`, that belongs to a piece's boundary."""
+    return values[fronts.boundary_at[p]:fronts.boundary_at[p + 1]]
 
 
 @njit(cache=True, nogil=True)

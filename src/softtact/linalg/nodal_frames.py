@@ -1,4 +1,4 @@
-"""Nodes of which one or more directions are to be unknowns: their coordinates are turned into local frames."""
+"""Local frames of nodes, so that displacements along given directions are unknowns of a system."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,9 +10,10 @@ from numba import njit
 
 @dataclass(frozen=True)
 class NodeFrames:
-    """first (k,): the first of each node's three unknowns x, y, z, rising;  turns (k, 3, 3): unit vectors in columns
+    """Selected directions at nodes, and other selected unknowns.
 
-    wanted (k,): how many of the vectors are meant, from the last on, 1 to 3;  others (o,): further unknowns that are meant
+    first (k,): the first of each node's three unknowns x, y, z, rising;  turns (k, 3, 3): unit vectors in columns
+    wanted (k,): number of selected vectors, 1 to 3, counted from the last;  others (o,): other selected unknowns
     """
 
     first: np.ndarray
@@ -21,57 +22,57 @@ class NodeFrames:
     others: np.ndarray
 
     @cached_property
-    def _meant(self):
+    def _selected(self):
         """Nodes (m,) and their vectors (m,)."""
         return np.nonzero(np.arange(3) >= 3 - self.wanted[:, None])
 
     @cached_property
     def last(self) -> np.ndarray:
-        """The unknowns (m + o,) that are movements along the vectors meant, once the nodes are turned, and the others."""
-        node, vector = self._meant
+        """The selected unknowns (m + o,) in the local frames: displacements along the vectors, and the others."""
+        node, vector = self._selected
         return np.append(self.first[node] + vector, self.others)
 
     def movements(self, unknowns: int) -> sp.csr_matrix:
-        """Sparse matrix (unknowns, m + o): a unit of each of the movements meant."""
-        (node, vector), along, (m, o) = self._meant, np.arange(3), (len(self._meant[0]), len(self.others))
+        """Sparse matrix (unknowns, m + o): a unit of each of the selected displacements."""
+        (node, vector), along, (m, o) = self._selected, np.arange(3), (len(self._selected[0]), len(self.others))
         rows = np.append(self.first[node, None] + along, self.others)
         values = np.append(self.turns[node[:, None], along, vector[:, None]], np.ones(o))
         return sp.csr_matrix((values, (rows, np.append(np.repeat(np.arange(m), 3), m + np.arange(o)))), shape=(unknowns, m + o))
 
     def covers(self, others: "NodeFrames") -> bool:
-        """Whether all that other frames mean is meant here, too, but for the vectors' directions."""
+        """Whether all that other frames select is selected here, too, whatever the directions of the vectors."""
         if not (np.isin(others.first, self.first).all() and np.isin(others.others, self.others).all()):
             return False
         return bool((others.wanted <= self.wanted[np.searchsorted(self.first, others.first)]).all())
 
     def turned_as(self, others: "NodeFrames") -> "NodeFrames":
-        """These with the vectors of others that they cover."""
+        """These frames with the vectors of other frames that they cover."""
         turns = self.turns.copy()
         turns[np.searchsorted(self.first, others.first)] = others.turns
         return replace(self, turns=turns)
 
     @cached_property
-    def _upright(self):
+    def _aligned(self):
         return bool((self.turns == np.eye(3)).all())
 
     def turned(self, vector: np.ndarray) -> np.ndarray:
-        """Components of a vector (unknowns,) in the turned coordinates."""
-        return self._changed(vector, "kji,kj->ki")
+        """Components of a vector (unknowns,) in the local frames."""
+        return self._rotated(vector, "kji,kj->ki")
 
     def turned_back(self, vector: np.ndarray) -> np.ndarray:
         """The inverse of `turned`."""
-        return self._changed(vector, "kij,kj->ki")
+        return self._rotated(vector, "kij,kj->ki")
 
-    def _changed(self, vector, how):
-        if self._upright:
+    def _rotated(self, vector, how):
+        if self._aligned:
             return vector
         out, places = vector.copy(), self.first[:, None] + np.arange(3)
         out[places] = np.einsum(how, self.turns, vector[places])
         return out
 
     def turned_matrix(self, upper: sp.csr_matrix) -> np.ndarray:
-        """Values of an upper triangle (csr, sorted) in the turned coordinates; what a node couples with, all its three do."""
-        if self._upright:
+        """Values of an upper triangle (csr, sorted) in the local frames; the three rows of a node have the same columns."""
+        if self._aligned:
             return upper.data
         frame = np.full(upper.shape[0], -1, dtype=np.int64)
         frame[self.first] = np.arange(len(self.first))
@@ -86,7 +87,7 @@ def _turn(indptr, indices, values, frame, turns):
         e = indptr[row]
         while e < indptr[row + 1]:
             k = frame[indices[e]]
-            if k >= 0 and indices[e] > row:     # beside the diagonal's block: three columns of one node
+            if k >= 0 and indices[e] > row:     # off the diagonal block: three columns of one node
                 values[e], values[e + 1], values[e + 2] = _times(values[e], values[e + 1], values[e + 2], turns[k])
                 e += 3
             else:
@@ -104,7 +105,7 @@ def _times(x, y, z, turn):
 
 @njit(cache=True, nogil=True)
 def _turn_rows(x, y, z, others, values, turn):
-    """A node's three rows, which begin at x, y and z with the upper half of its own block, before `others` columns."""
+    """Turn a node's three rows, which begin at x, y and z with the upper half of the diagonal block, before `others` columns."""
     block = np.empty((3, 3), values.dtype)
     block[0], block[1, 1:], block[2, 2] = values[x:x + 3], values[y:y + 2], values[z]
     block[1, 0], block[2, 0], block[2, 1] = block[0, 1], block[0, 2], block[1, 2]

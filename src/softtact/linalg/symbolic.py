@@ -1,14 +1,14 @@
 """Symbolic factorisation, once for a pattern: the order of elimination by nested dissection, and the layout of the fronts.
 
-A body is cut along lines or planes by the places of its nodes, recursively; the cuts are eliminated last. On a plane no order needs
-fewer operations, but for a factor (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find the lines first: it takes
-five times as long for a third more operations on a wide and thin sensor's lattice (docs/notebook/2026-11-25-linear-solver.md). In
-space the cuts begin as planes and are then shortened node by node: on a body of irregular tetrahedra that saves more than half of
-the operations (docs/notebook/2026-11-26-solids-in-single-precision.md).
+A body is cut along lines or planes by the positions of its nodes, recursively; the cuts are eliminated last. In the plane this
+order is optimal up to a constant factor (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find the lines first: it
+takes five times as long for a third more operations on a wide and thin sensor's lattice
+(docs/notebook/2026-11-25-linear-solver.md). In space the cuts begin as planes and are then shortened node by node: on a body of
+irregular tetrahedra that saves more than half of the operations (docs/notebook/2026-11-26-solids-in-single-precision.md).
 
-A cut along a plane through irregular tetrahedra takes with it a layer of elements' nodes. Of the edges between the two sides, the
-fewest nodes that touch all of them are a cut, too, mostly one sheet of nodes; and which nodes of a cut count to either side may be
-chosen anew until nothing is gained.
+A cut along a plane through irregular tetrahedra holds the nodes of a layer of elements. The fewest nodes that touch all edges
+between the two sides are a cut, too, mostly a single sheet of nodes. The nodes of a cut can be counted to either side, so this is
+repeated until nothing is gained.
 Reference: Pothen and Fan, ACM Trans. Math. Softw. 16 (1990), on covers by Koenig's theorem.
 """
 
@@ -22,26 +22,26 @@ from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from softtact.linalg.multifrontal import Fronts
 
-_LEAST_SHARE = 0.1           # of the unknowns on either side of a cut
-_PRICE_OF_IMBALANCE = {2: 2.0, 3: 1.0}   # in plan, in space: a cut between unlike parts counts as so much longer
-_SMALLEST = 200              # unknowns: what has fewer is not cut; smaller ones have fewer operations, in slower pieces
-_GRID_MM = 1e-6              # nodes are one column where their places round to the same
+_LEAST_SHARE = 0.1           # of the unknowns, on the smaller side of a cut
+_PRICE_OF_IMBALANCE = {2: 2.0, 3: 1.0}   # in plan, in space: a cut between parts of unequal size counts as longer
+_SMALLEST = 200              # unknowns: parts with fewer are not cut; smaller parts mean fewer but slower operations
+_GRID_MM = 1e-6              # nodes whose positions round to the same are one column
 _ROUNDS = 8
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A cut, or a part that was not cut further: unknowns (k,) that it eliminates, and the pieces that come before it."""
+    """A cut, or a part that was not cut further: its pivots, the unknowns (k,) that it eliminates, and the pieces before it."""
 
-    own: np.ndarray
+    pivots: np.ndarray
     before: tuple
 
 
 def dissect(indptr: np.ndarray, indices: np.ndarray, places: np.ndarray, *, without: np.ndarray | None = None) -> list[Piece]:
-    """`Piece`s of a symmetric matrix, each behind those before it; the first cut is the last piece.
+    """`Piece`s of a symmetric matrix, each after those that it depends on; the first cut is the last piece.
 
-    indptr, indices: pattern of its upper triangle (csr);  places (n, 2 or 3): place of each unknown, in plan or in
-    space, in mm;  without: unknowns (k,) that are to be in none
+    indptr, indices: pattern of its upper triangle (csr);  places (n, 2 or 3): position of each unknown, in plan or in
+    space, in mm;  without: unknowns (k,) that belong to no piece
     """
     columns, column_of = np.unique(np.round(places / _GRID_MM).astype(np.int64), axis=0, return_inverse=True)
     column_of = column_of.ravel()
@@ -52,7 +52,7 @@ def dissect(indptr: np.ndarray, indices: np.ndarray, places: np.ndarray, *, with
     member_at = np.cumsum([0, *weight])
     pieces: list[Piece] = []
     _cut(_graph_of_columns(indptr, indices, column_of, members, member_at), columns, weight, np.flatnonzero(weight), pieces)
-    return [Piece(own=_members_of(piece.own, members, member_at), before=piece.before) for piece in pieces]
+    return [Piece(pivots=_members_of(piece.pivots, members, member_at), before=piece.before) for piece in pieces]
 
 
 def _members_of(columns, members, member_at):
@@ -60,7 +60,7 @@ def _members_of(columns, members, member_at):
 
 
 def _graph_of_columns(indptr, indices, column_of, members, member_at):
-    """Which columns the pattern couples, in both directions, as a sparse matrix of ones."""
+    """The symmetric graph of columns that the pattern couples, as a sparse matrix of ones."""
     pairs, size = _neighbours(indptr, indices, column_of, members, member_at), len(member_at) - 1
     graph = sp.csr_matrix((np.ones(len(pairs), dtype=np.float32), pairs.T), shape=(size, size))
     return (graph + graph.T).tocsr()
@@ -68,7 +68,7 @@ def _graph_of_columns(indptr, indices, column_of, members, member_at):
 
 @njit(cache=True, nogil=True)
 def _neighbours(indptr, indices, column_of, members, member_at):
-    """Pairs (e, 2) of columns of which the first one's rows have entries in the second, each once."""
+    """Pairs (e, 2) of columns such that a row of the first has an entry in the second, each pair once."""
     pairs, count, seen = np.empty((len(members), 2), np.int64), 0, np.full(len(member_at) - 1, -1, np.int64)
     for column in range(len(member_at) - 1):
         for row in members[member_at[column]:member_at[column + 1]]:
@@ -84,10 +84,10 @@ def _neighbours(indptr, indices, column_of, members, member_at):
 
 
 def _cut(graph, places, weight, here, pieces):
-    """Append the pieces of some columns (c,), and return the number of the last."""
+    """Append the pieces of columns `here` (c,), and return the number of the last."""
     part = _best_cut(graph[here][:, here], places[here], weight[here]) if weight[here].sum() > _SMALLEST else None
     before = () if part is None else tuple(_cut(graph, places, weight, here[part == side], pieces) for side in (-1, 1))
-    pieces.append(Piece(own=here if part is None else here[part == 0], before=before))
+    pieces.append(Piece(pivots=here if part is None else here[part == 0], before=before))
     return len(pieces) - 1
 
 
@@ -95,7 +95,7 @@ def _best_cut(graph, places, weight):
     """For each column (c,) whether it lies on the cut (0) or on which side of it (-1, 1); None where nothing can be cut."""
     best, part, per_imbalance = np.inf, None, _PRICE_OF_IMBALANCE[places.shape[1]]
     for place in places.T:
-        # A column is on the cut at a line where it does not lie beyond, but one of its neighbours does.
+        # A column is on the cut at a line if it does not lie beyond the line but one of its neighbours does.
         reach, lines = np.maximum.reduceat(place[graph.indices], graph.indptr[:-1]), np.unique(place)
         near, not_beyond = (np.bincount(np.searchsorted(lines, x), weight, len(lines)).cumsum() for x in (reach, place))
         cost = _price(near, not_beyond - near, weight.sum() - not_beyond, per_imbalance)
@@ -108,16 +108,16 @@ def _best_cut(graph, places, weight):
 
 
 def _price(near, cut, far, per_imbalance):
-    """What a cut of such a weight costs: more the less alike its sides, and infinite where one of them is too small."""
+    """Cost of a cut by its weight and the weights of its sides: larger for unequal sides, infinite where one is too small."""
     whole = near + cut + far
     cost = cut * (1 + per_imbalance * np.abs(far - near) / whole)
     return np.where(np.minimum(near, far) >= _LEAST_SHARE * whole, cost, np.inf)
 
 
 def shortened(graph: sp.csr_matrix, side: np.ndarray, cost: Callable[[np.ndarray], float]) -> np.ndarray:
-    """A cut of lower cost next to a given one, or that one. Of each node (n,): 0 on the cut, -1 and 1 on its sides.
+    """A cut near a given one with a lower cost, else the given one. For each node (n,): 0 on the cut, -1 and 1 on its sides.
 
-    graph: symmetric pattern (n, n), whatever its values;  cost: of such an array; infinite where it may not be
+    graph: symmetric pattern (n, n), whatever its values;  cost: of such an array; infinite for a cut that is not allowed
     """
     best = cost(side)
     for _ in range(_ROUNDS):
@@ -132,7 +132,7 @@ def shortened(graph: sp.csr_matrix, side: np.ndarray, cost: Callable[[np.ndarray
 
 
 def least_cover(graph: sp.csr_matrix, beyond: np.ndarray) -> np.ndarray:
-    """Of each node (n,): 0 for the fewest that touch every edge between two sides, else 1 where it lies `beyond` (n,), else -1."""
+    """For each node (n,): 0 in the smallest set that touches every edge between two sides, else 1 where `beyond` (n,), else -1."""
     near, far = np.flatnonzero(~beyond), np.flatnonzero(beyond)
     edges = graph[near][:, far].tocsr()
     rows, columns = np.flatnonzero(np.diff(edges.indptr)), np.unique(edges.indices)
@@ -146,7 +146,7 @@ def least_cover(graph: sp.csr_matrix, beyond: np.ndarray) -> np.ndarray:
 
 @njit(cache=True, nogil=True)
 def _cover(indptr, indices, matched, columns):
-    """Which rows and columns (rows + columns,) touch all entries, from a largest matching {row: column}, by Koenig's theorem."""
+    """The smallest cover of all entries by rows and columns (rows + columns,), from a largest matching (Koenig's theorem)."""
     rows = len(matched)
     covered, row_of = np.zeros(rows + columns, np.bool_), np.full(columns, -1, np.int64)
     covered[:rows] = True
@@ -176,83 +176,83 @@ def lay_out(indptr: np.ndarray, indices: np.ndarray, pieces: Sequence[Piece], *,
             bordered: bool = False) -> tuple[Fronts, np.ndarray]:
     """`Fronts` of a matrix whose upper triangle (csr) has this pattern, for `Piece`s of a dissection in the order of elimination.
 
-    bordered: one more unknown, coupled with all and in the last piece; its column's entries come behind those of the pattern
-    Also the unknowns (n,) in that order. Where panels and updates lie while they are needed depends on who works on which when:
-    `with_room` gives them their places.
+    bordered: one more unknown, coupled with all and in the last piece; its column's entries follow those of the pattern
+    Also the unknowns (n,) in that order. `with_storage` places panels and updates in memory, as that depends on the distribution of
+    the work.
     """
-    order = np.concatenate([piece.own for piece in pieces])
-    own_at = _starts([len(piece.own) for piece in pieces])
+    order = np.concatenate([piece.pivots for piece in pieces])
+    pivot_at = _starts([len(piece.pivots) for piece in pieces])
     rank = np.empty(len(order), dtype=np.int32)
     rank[order] = np.arange(len(order))
-    owner = np.repeat(np.arange(len(pieces)), np.diff(own_at))
+    owner = np.repeat(np.arange(len(pieces)), np.diff(pivot_at))
     entry_at, source, low, high = _entries(indptr, indices, bordered, rank, owner, len(pieces))
-    bound = _bound(pieces, own_at, entry_at, high)
-    bound_at, flat = _starts(map(len, bound)), np.concatenate(bound)
+    boundary = _boundary(pieces, pivot_at, entry_at, high)
+    boundary_at, flat = _starts(map(len, boundary)), np.concatenate(boundary)
     fronts = Fronts(
-        own_at=own_at, bound_at=bound_at, bound=flat, child_at=_starts(len(piece.before) for piece in pieces),
+        pivot_at=pivot_at, boundary_at=boundary_at, boundary=flat, child_at=_starts(len(piece.before) for piece in pieces),
         child=np.array([child for piece in pieces for child in piece.before], dtype=np.int64),
-        place=_places_in_parents(pieces, bound, own_at), entry_at=entry_at, source=source,
-        target=_targets(own_at, bound_at, flat, entry_at, low, high),
-        triangle_at=_starts(np.diff(own_at) * (np.diff(own_at) + 1) // 2),
-        short_at=_starts(np.diff(own_at) * np.diff(bound_at)), panel_at=None, update_at=None)
+        place=_places_in_parents(pieces, boundary, pivot_at), entry_at=entry_at, source=source,
+        target=_targets(pivot_at, boundary_at, flat, entry_at, low, high),
+        triangle_at=_starts(np.diff(pivot_at) * (np.diff(pivot_at) + 1) // 2),
+        short_at=_starts(np.diff(pivot_at) * np.diff(boundary_at)), panel_at=None, update_at=None)
     return fronts, order
 
 
-def with_room(fronts: Fronts, parts: Sequence[np.ndarray], levels: Sequence[np.ndarray]) -> tuple[Fronts, int]:
-    """Fronts with places for their panels and updates, and how much room these take together.
+def with_storage(fronts: Fronts, parts: Sequence[np.ndarray], levels: Sequence[np.ndarray]) -> tuple[Fronts, int]:
+    """Fronts with places for their panels and updates in one array, and the length of that array.
 
-    parts: pieces (k,) that are worked on one after the other, the parts at the same time;  levels: pieces (k,), behind all parts
-    and one level after the other
-    A panel is needed while its piece is worked on, an update until it is taken over.
+    parts: pieces (k,) that are factored one after the other, the parts in parallel;  levels: pieces (k,), after all parts and one
+    level after the other
+    A panel is needed while its piece is factored, an update until it is added to a later front.
     """
-    own, bound = np.diff(fronts.own_at), np.diff(fronts.bound_at)
-    panel_at, update_at = np.zeros(len(own), dtype=np.int64), np.zeros(len(own), dtype=np.int64)
-    panels, updates, room = own * (own + bound), bound**2, _Room(0)
+    pivots, boundary = np.diff(fronts.pivot_at), np.diff(fronts.boundary_at)
+    panel_at, update_at = np.zeros(len(pivots), dtype=np.int64), np.zeros(len(pivots), dtype=np.int64)
+    panels, updates, memory = pivots * (pivots + boundary), boundary**2, _Memory(0)
 
-    def enter(pieces, room):
+    def allocate(pieces, memory):
         for p in pieces:
-            panel_at[p], update_at[p] = room.take(panels[p]), room.take(updates[p])
+            panel_at[p], update_at[p] = memory.allocate(panels[p]), memory.allocate(updates[p])
 
-    def leave(pieces, room):
+    def free(pieces, memory):
         for p in pieces:
-            room.give_back(panel_at[p], panels[p])
+            memory.free(panel_at[p], panels[p])
             for child in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-                room.give_back(update_at[child], updates[child])
+                memory.free(update_at[child], updates[child])
 
-    ended: list[tuple[int, int]] = []
+    still_used: list[tuple[int, int]] = []
     for part in parts:
-        own_room = _Room(room.most)
+        part_memory = _Memory(memory.end)
         for p in part:
-            enter([p], own_room)
-            leave([p], own_room)
-        ended, room = ended + own_room.taken, own_room
-    room.start, room.taken = 0, sorted(ended)
+            allocate([p], part_memory)
+            free([p], part_memory)
+        still_used, memory = still_used + part_memory.used, part_memory
+    memory.start, memory.used = 0, sorted(still_used)
     for level in levels:
-        enter(level, room)
-        leave(level, room)
-    return fronts._replace(panel_at=panel_at, update_at=update_at), room.most
+        allocate(level, memory)
+        free(level, memory)
+    return fronts._replace(panel_at=panel_at, update_at=update_at), memory.end
 
 
-class _Room:
-    """Places on a line: what is taken as (start, end), rising, and the farthest end so far."""
+class _Memory:
+    """First-fit allocation in an array: the intervals (start, end) in use, rising, and the largest end so far."""
 
     def __init__(self, start):
-        self.start, self.most, self.taken = start, start, []
+        self.start, self.end, self.used = start, start, []
 
-    def take(self, size):
-        """The first place behind `start` with so much room."""
-        place, behind = self.start, 0
-        while size and behind < len(self.taken) and self.taken[behind][0] - place < size:
-            place, behind = self.taken[behind][1], behind + 1
+    def allocate(self, size):
+        """The first gap from `start` on with `size` entries."""
+        place, number = self.start, 0
+        while size and number < len(self.used) and self.used[number][0] - place < size:
+            place, number = self.used[number][1], number + 1
         if size:
-            self.taken.insert(behind, (place, place + int(size)))
-        self.most = max(self.most, place + int(size))
+            self.used.insert(number, (place, place + int(size)))
+        self.end = max(self.end, place + int(size))
         return place
 
-    def give_back(self, place, size):
-        """What was taken from this place on."""
+    def free(self, place, size):
+        """Free the interval that was allocated at this place."""
         if size:
-            self.taken.remove((place, place + size))
+            self.used.remove((place, place + size))
 
 
 def _starts(counts):
@@ -261,9 +261,9 @@ def _starts(counts):
 
 @njit(cache=True, nogil=True)
 def _entries(indptr, indices, bordered, rank, owner, pieces):
-    """Which entries (e,) each piece takes up, piece by piece from `entry_at` (pieces + 1,) on, and their two unknowns' ranks.
+    """Numbers of the matrix' entries (e,), piece by piece from `entry_at` (pieces + 1,) on, and the ranks of their two unknowns.
 
-    owner: of each rank; an entry is of the piece that eliminates the first of its unknowns.
+    owner: piece of each rank; an entry belongs to the piece that eliminates the first of its unknowns.
     """
     counts, rows = np.zeros(pieces + 1, np.int64), len(indptr) - 1
     for row in range(rows):
@@ -288,18 +288,18 @@ def _entries(indptr, indices, bordered, rank, owner, pieces):
     return entry_at, source, low, high
 
 
-def _bound(pieces, own_at, entry_at, high):
-    """Piece by piece the later unknowns (b,) that it is coupled with, by the matrix or by what came before it; rising."""
-    bound, seen = [], np.full(own_at[-1], -1, dtype=np.int64)
+def _boundary(pieces, pivot_at, entry_at, high):
+    """For each piece the later unknowns (b,) that it is coupled with, by the matrix or by updates before it; rising."""
+    boundary, seen = [], np.full(pivot_at[-1], -1, dtype=np.int64)
     for p, piece in enumerate(pieces):
-        passed_on = np.concatenate([np.zeros(0, dtype=np.int64), *(bound[child] for child in piece.before)])
-        bound.append(np.sort(_later(p, own_at[p + 1], high[entry_at[p]:entry_at[p + 1]], passed_on, seen)))
-    return bound
+        passed_on = np.concatenate([np.zeros(0, dtype=np.int64), *(boundary[child] for child in piece.before)])
+        boundary.append(np.sort(_later(p, pivot_at[p + 1], high[entry_at[p]:entry_at[p + 1]], passed_on, seen)))
+    return boundary
 
 
 @njit(cache=True, nogil=True)
 def _later(p, end, high, passed_on, seen):
-    """The ranks from `end` on among two lists, each once; `seen` (n,): the last piece that met a rank."""
+    """The ranks from `end` on in two lists, each once; `seen` (n,): the last piece that listed a rank."""
     out, count = np.empty(len(seen) - end, np.int64), 0
     for some in (high.astype(np.int64), passed_on):
         for k in some:
@@ -310,27 +310,28 @@ def _later(p, end, high, passed_on, seen):
     return out[:count]
 
 
-def _places_in_parents(pieces, bound, own_at):
+def _places_in_parents(pieces, boundary, pivot_at):
+    """Rows of the pieces' boundaries in the fronts that their updates are added to, concatenated."""
     places = [np.zeros(0, dtype=np.int64)] * len(pieces)
     for p, piece in enumerate(pieces):
         for child in piece.before:
-            mine = bound[child] < own_at[p + 1]
-            places[child] = np.where(mine, bound[child] - own_at[p],
-                                     own_at[p + 1] - own_at[p] + np.searchsorted(bound[p], bound[child]))
+            is_pivot = boundary[child] < pivot_at[p + 1]
+            places[child] = np.where(is_pivot, boundary[child] - pivot_at[p],
+                                     pivot_at[p + 1] - pivot_at[p] + np.searchsorted(boundary[p], boundary[child]))
     return np.concatenate(places).astype(np.int32)
 
 
 @njit(cache=True)
-def _targets(own_at, bound_at, bound, entry_at, low, high):
-    """Place of each entry in its piece's panel, of the unknowns `low` and `high`."""
-    out, place = np.empty(len(low), np.int32), np.zeros(own_at[-1], np.int64)
-    for p in range(len(own_at) - 1):
-        first, own = own_at[p], own_at[p + 1] - own_at[p]
-        width = own + bound_at[p + 1] - bound_at[p]
-        for k in range(own):
+def _targets(pivot_at, boundary_at, boundary, entry_at, low, high):
+    """Place in its piece's panel of each entry, whose unknowns are `low` and `high`."""
+    out, place = np.empty(len(low), np.int32), np.zeros(pivot_at[-1], np.int64)
+    for p in range(len(pivot_at) - 1):
+        first, pivots = pivot_at[p], pivot_at[p + 1] - pivot_at[p]
+        width = pivots + boundary_at[p + 1] - boundary_at[p]
+        for k in range(pivots):
             place[first + k] = k
-        for k in range(bound_at[p + 1] - bound_at[p]):
-            place[bound[bound_at[p] + k]] = own + k
+        for k in range(boundary_at[p + 1] - boundary_at[p]):
+            place[boundary[boundary_at[p] + k]] = pivots + k
         for e in range(entry_at[p], entry_at[p + 1]):
             out[e] = (low[e] - first) * width + place[high[e]]
     return out

@@ -1,4 +1,4 @@
-"""Products with a symmetric matrix of which only the upper triangle is there."""
+"""Products with a symmetric matrix of which only the upper triangle is stored."""
 
 import numpy as np
 from numba import njit
@@ -9,7 +9,7 @@ from softtact.linalg.workers import SERIAL, Workers
 class SymmetricProduct:
     """A x for symmetric matrices of one pattern, given by their upper triangles (csr, sorted, with their diagonals).
 
-    Values are read once, not once for each triangle, and the columns of rows that have the same ones (a node's three) once for all.
+    Values are read once, not once for each triangle. Rows with the same columns (the three of a node) read these once.
     """
 
     _parts: list[tuple[int, np.ndarray]]
@@ -19,17 +19,17 @@ class SymmetricProduct:
         alike = _rows_alike(indptr, indices)
         first = np.cumsum([0, *alike])
         half = np.searchsorted(indptr[first], indptr[-1] // 2)
-        self._parts = [(0, alike[:half]), (first[half], alike[half:])]     # as many values in each; sums do not depend on threads
+        self._parts = [(0, alike[:half]), (first[half], alike[half:])]     # halves by their values; sums do not depend on threads
 
     def __call__(self, data: np.ndarray, x: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
-        """A x (n,) in double precision, whatever that of the values."""
+        """A x (n,) in double precision, whatever the precision of the values."""
         one, other = workers.map(lambda part: _symmetric_product(self._indptr, self._indices, data, *part, x), self._parts)
         return one + other
 
 
 @njit(cache=True, nogil=True)
 def _rows_alike(indptr, indices):
-    """How many rows, one after the other, have the same columns from their diagonals on, all of them in threes: else ones."""
+    """Sizes of groups of consecutive rows: 3 where three rows have the same columns from their diagonals on, in threes; else 1."""
     alike, count, row = np.empty(len(indptr) - 1, np.int8), 0, 0
     while row < len(indptr) - 1:
         together = row + 2 < len(indptr) - 1
@@ -46,7 +46,7 @@ def _rows_alike(indptr, indices):
 
 @njit(cache=True, nogil=True)
 def _in_threes(columns):
-    """Whether columns come in groups of three that follow on each other."""
+    """Whether columns come in groups of three consecutive numbers."""
     if len(columns) % 3:
         return False
     for k in range(0, len(columns), 3):
@@ -57,18 +57,18 @@ def _in_threes(columns):
 
 @njit(cache=True, nogil=True)
 def _symmetric_product(indptr, indices, data, row, alike, x):
-    """What the rows from `row` on give, by their upper halves."""
+    """Contribution (n,) of the rows from `row` on and of their mirror images."""
     out = np.zeros(len(x))
     for rows in alike:
         if rows == 3:
             _add_three_rows(row, indptr, indices, data, x, out)
         else:
-            own, total = x[row], 0.0
+            x_row, total = x[row], 0.0
             for k in range(indptr[row], indptr[row + 1]):
                 column, value = indices[k], data[k]
                 total += value * x[column]
                 if column != row:
-                    out[column] += value * own
+                    out[column] += value * x_row
             out[row] += total
         row += rows
     return out
@@ -76,7 +76,7 @@ def _symmetric_product(indptr, indices, data, row, alike, x):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _add_three_rows(row, indptr, indices, data, x, out):
-    # Unsigned places: numba asks of signed ones whether they count from the end.
+    # Unsigned indices: for signed ones numba checks whether they count from the end.
     one, two, three = np.uintp(1), np.uintp(2), np.uintp(3)
     columns = indices[indptr[row]:indptr[row + 1]]
     first, second, third = (data[indptr[row]:indptr[row + 1]], data[indptr[row + 1]:indptr[row + 2]],

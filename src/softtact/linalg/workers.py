@@ -1,4 +1,4 @@
-"""Work on slices of many like things, on as many threads as were asked for. The kernels release Python's lock."""
+"""Work in parallel on slices of arrays, on a given number of threads. The kernels release Python's lock."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +14,7 @@ _Result = TypeVar("_Result")
 
 
 class Workers:
-    """Runs a function over items in order; with one thread in that of the caller."""
+    """Runs a function over items in order; one thread means that of the caller."""
 
     def __init__(self, threads: int = 1) -> None:
         self.threads = threads
@@ -34,18 +34,18 @@ SERIAL = Workers()
 
 
 def one_thread_each() -> AbstractContextManager:
-    """While this lasts, BLAS stays on the thread that calls it: threads that call it would wait for each other's threads."""
+    """A context in which BLAS runs on the thread that calls it: otherwise threads that call it wait for each other's threads."""
     return threads_of_blas(1)
 
 
 def threads_of_blas(count: int) -> AbstractContextManager:
-    """While this lasts, BLAS works on so many threads."""
+    """A context in which BLAS runs on `count` threads."""
     return _libraries().limit(limits=count)
 
 
 @cache
 def _libraries():
-    return ThreadpoolController()     # which takes milliseconds, and needs the libraries loaded
+    return ThreadpoolController()     # takes milliseconds, and needs the libraries loaded
 
 
 def slices(count: int, size: int) -> list[slice]:
@@ -59,9 +59,9 @@ def chunks(numbers: np.ndarray, size: int) -> list[np.ndarray]:
 
 
 def unique_rows(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (u,) of rows of a table (n, k) that represent all, and for each row (n,) which of these it equals.
+    """Numbers (u,) of the distinct rows of a table (n, k), and for each row (n,) which of these it equals.
 
-    Equal to 1e-9 of the largest entry; distinguished by two random projections, which like rows share.
+    Equal means to 1e-9 of the largest entry. Rows are compared by two random projections, which are the same for equal rows.
     """
     scale = max(np.abs(table).max(), 1e-300)
     directions = np.random.default_rng(0).standard_normal((table.shape[1], 2))

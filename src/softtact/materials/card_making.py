@@ -1,7 +1,7 @@
-"""A material card made: the family of laws fitted, judged and compared (docs/reference/materials.md).
+"""Making a material card: the laws are fitted, judged and compared (docs/reference/materials.md).
 
-Judged are how the laws of one card differ, where the data are and just outside, and how well a law that is fitted to some tests
-predicts another. The difference of two laws on a path is the root mean square of the difference of their nominal stresses over
+A card reports how its laws differ within the data and just outside, and how well a law that is fitted to some tests predicts
+another. The difference of two laws on a path is the root mean square of the difference of their nominal stresses over
 that of their mean.
 """
 
@@ -31,30 +31,30 @@ from softtact.materials.laws.base import TEST_PATHS, Law
 from softtact.materials.linear import LinearConstants, bulk_modulus, poisson_ratio, small_strain_constants, young_modulus
 from softtact.progress import progress
 
-_SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
-_NOTABLE = 0.01     # relative error from which that is worth saying
-# Root mean square error over stress from which a card is taken not to describe its curves. Published rubbers leave 1 to 17 %, and
-# 25 to 46 % only where few constants follow a large range, or a coarse load cell a small one.
+_SYSTEMATIC = 0.7   # autocorrelation from which residuals are the law's misfit; noise gives 0 +- 1/sqrt(points)
+_NOTABLE = 0.01     # relative error from which that is reported
+# Root mean square error over stress above which a card does not describe its curves. Fits of published rubbers have 1 to 17 %, and
+# 25 to 46 % only for few constants over a large range, or a coarse load cell over a small one.
 LARGEST_ERROR = 0.25
 
 _BOUNDS = {"bulk_over_shear": (2 / 3, np.inf), "poisson": (-1.0, 0.5), "small_strain": (0.0, 1.0)}
-THRESHOLD = 0.2     # laws that part by more are named
-MARGIN = 0.1        # "just outside": so much farther, as a share of the window's extent in log stretch
+THRESHOLD = 0.2     # laws that differ by more are named
+MARGIN = 0.1        # width of "just outside", as a share of the window's extent in log stretch
 _POINTS = 33
 
 
 @dataclass(frozen=True)
 class CardOptions:
-    """What a card is made with.
+    """Options of a card.
 
     laws: list of names, or "all"
     choose: the law that the solvers take, or "best": the first of the ranking
-    bulk_over_shear: K / mu0, for want of a volumetric test
+    bulk_over_shear: K / mu0, without a volumetric test
     poisson: Poisson's ratio of the linear constants; without it, it follows from a volumetric test, or the card has none
     small_strain: strain up to which E is the slope of the uniaxial curve
     window: {mode: [min, max]} stretch (volume ratio) to use, all by default
     residual, weights, nonnegative, starts, seed: see `softtact.materials.fitting.FitOptions`
-    predict_left_out: fit each law also to all modes but one, and report how it meets that one
+    predict_left_out: fit each law also to all modes but one, and report its error for that one
     disagreement: difference of two laws' stresses, as a share, beyond which they are named
     """
 
@@ -148,7 +148,7 @@ def _windowed(curves, window):
 
 
 def _choose(choose, ranking, entries):
-    """The name of the law to take: never one that is unstable where its data are."""
+    """The name of the law for the solvers: never one that is unstable within its data."""
     if choose not in (*ranking, "best"):
         raise InputError(f"Law {choose!r} is to be chosen but is not fitted; choose one of {', '.join(ranking)}.")
     name = ranking[0] if choose == "best" else choose
@@ -169,7 +169,7 @@ def _curve_entry(curve):
 
 
 def _law_entry(fit, curves, bulk, options):
-    """What the card says of one law."""
+    """The card's entry of one law."""
     law = fit.make()
     modulus = bulk.of(law.mu0)
     low, high = SCAN
@@ -217,7 +217,7 @@ def _agreement(entries, curves):
 
 
 def _linear_entry(curves, bulk, options):
-    """({"linear": entry}, warnings), or ({}, why there is none)."""
+    """({"linear": entry}, warnings), or ({}, [the reason for its absence])."""
     if options.poisson is None and bulk.modulus_mpa is None:
         return {}, ["No linear constants: curves do not hold Poisson's ratio, and none was stated (`poisson`), nor a volumetric"
                     " curve given."]
@@ -253,7 +253,7 @@ def _fit_warnings(fit, entry):
 
 
 def _systematic(fits):
-    """One sentence on the laws whose errors are no noise."""
+    """One sentence on the laws with systematic errors."""
     named = [f"{fit.law} ({fit.autocorrelation:.2f})" for fit in fits
              if fit.autocorrelation > _SYSTEMATIC and fit.relative_error > _NOTABLE]
     if named:
@@ -266,7 +266,7 @@ def _ranges(entry):
 
 
 def _consistency_warnings(card, threshold):
-    """Laws that part from the chosen one, and linear constants that no stable law has."""
+    """Sentences on laws that differ from the chosen one, and on linear constants that no stable law has."""
     usable = {name: law_of_entry(name, card["laws"][name]) for name in card["ranking"] if card["laws"][name]["stable_over_data"]}
     linear = linear_from_card(card) if "linear" in card["laws"] else None
     parted = partings(card["chosen"], card["agreement"], among=list(usable), threshold=threshold)
@@ -312,7 +312,7 @@ def differences(laws: Mapping[str, Law], paths: Mapping[str, np.ndarray]) -> dic
 
 
 def partings(chosen: str, agreement: Mapping[str, Any], *, among: Collection[str], threshold: float = THRESHOLD) -> Iterator[str]:
-    """Sentences on the laws of the list `among` that part from the chosen one by more than `threshold`."""
+    """Sentences on the laws of the list `among` that differ from the chosen one by more than `threshold`."""
     for place, where in (("inside", "within the data"), ("outside", "just outside the data")):
         named = [f"{name} by {_share(entry)} ({entry['mode']})" for name, entry in agreement[place].get(chosen, {}).items()
                  if name in among and (entry["difference"] is None or entry["difference"] > threshold)]
@@ -328,8 +328,8 @@ def _share(entry):
 def predict_left_out(name: str, curves: Sequence[Curve], **options: Any) -> dict[str, dict[str, float] | None]:
     """{mode: {"rmse_mpa", "relative_error"}} of the law fitted to all curves but that mode's; {} with fewer than two.
 
-    options: those of `FitOptions`. A law that the other curves have too few points for, or that does not exist where the one
-    left out goes, has None.
+    options: those of `FitOptions`. None for a law that has too few points in the other curves, or that does not exist
+    at the stretches of the one left out.
     """
     if len(curves) < 2:
         return {}

@@ -1,4 +1,4 @@
-"""Material cards, and the laws made from them: what every stage after the fit reads (docs/reference/materials.md)."""
+"""Material cards, and the laws made from them, for all stages after the fit (docs/reference/materials.md)."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +15,7 @@ from softtact.materials.linear import LinearConstants
 
 
 class _CardLaw(pydantic.BaseModel):
-    """What presses take of a card's law; the card holds more."""
+    """The part of a card's law that presses use."""
 
     model_config = pydantic.ConfigDict(strict=True)
     parameters: dict[str, pydantic.FiniteFloat]
@@ -23,7 +23,7 @@ class _CardLaw(pydantic.BaseModel):
 
 
 class _Card(pydantic.BaseModel):
-    """What presses take of a card."""
+    """The part of a card that presses use."""
 
     model_config = pydantic.ConfigDict(strict=True)
     material: str
@@ -34,7 +34,7 @@ class _Card(pydantic.BaseModel):
 
 
 def load_card(path: str | Path) -> dict[str, Any]:
-    """Read a card, a mapping as `softtact fit` wrote it; a file that is none is refused."""
+    """Read a card, the mapping that `softtact fit` wrote; other files are refused."""
     card = read_json(path)
     missing = [key for key in ("material", "kind", "chosen", "laws") if not isinstance(card, dict) or key not in card]
     if missing:
@@ -53,7 +53,7 @@ def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
         )
     try:
         made = law_of_entry(name, card["laws"][name])
-    except InputError as error:     # of constants, which know no card
+    except InputError as error:     # of constants: the message does not name the card
         raise InputError(f"The card of material {card['material']}: {error}") from None
     made.stretch_window = principal_window(card.get("strain_window", {}))
     return made

@@ -1,8 +1,8 @@
-"""What makes a test curve unfit for a fit: refused with row and remedy, or, where it may be right, stated in a remark.
+"""Checks of a test curve: impossible data are refused with row and remedy, doubtful ones are stated in a remark.
 
-Remarks judge by what a rubber can be. The measure is the neo-Hookean law, stress = mu (l_1^2 - l_3^2) / stretch: whatever the
-rubber, at small strain the curve is that straight line through zero (nothing else is isotropic and incompressible), and in tension
-it softens from there before it stiffens.
+Remarks compare with the behaviour of rubber. The reference is the neo-Hookean law, stress = mu (l_1^2 - l_3^2) / stretch: at small
+strain every isotropic incompressible material follows it, a straight line through zero, and in tension rubber first softens from
+there and then stiffens.
   unit of strain   the curve has the form of that law in percent, and not as a ratio, or vice versa
   modulus          from silicone gels to hard polyurethane
   zero             a preload has stress at no strain, slack has strain at no stress
@@ -19,35 +19,35 @@ from softtact.errors import InputError
 from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve
 from softtact.materials.laws.base import principal_stretches
 
-# No elastomer goes beyond these; values beyond are percent or another unit.
+# No elastomer exceeds these; larger values are percent or in another unit.
 LARGEST_STRETCH = 25.0
 LARGEST_STRESS_MPA = 200.0
 LARGEST_PRESSURE_MPA = 2000.0
 # Stress may have the wrong sign by this share of the largest one (zero drift of a load cell) before it is refused.
 SIGN_TOLERANCE = 0.05
-# kPa among MPa is a factor of 1000; the modes of one rubber, over whatever range, are within ten of each other.
+# kPa among MPa is a factor of 1000; the moduli of one rubber in different modes are within a factor of ten over any range.
 UNIT_JUMP = (200.0, 5000.0)
 MODULI_APART = 50.0
 SMALLEST_SOLID = 0.7    # volume ratio; a foam's goes below
 _MODULI_MPA = (0.001, 30.0)     # initial shear moduli of gels, and of hard polyurethane
-_COMMON_MPA = 10.0              # a silicone's curve is so straight up to a stretch of 2 that in percent it would be one of 20 MPa
-# Another reading of a curve is reported where it leaves less than this share of the error: real rubbers leave half or more of it.
+_COMMON_MPA = 10.0              # in percent, a silicone's curve, which is straight up to a stretch of 2, would have 20 MPa
+# Another interpretation of a curve is reported where it has less than this share of the error; for real rubbers it has half or
+# more.
 _MUCH_BETTER = 0.2
-_LARGEST_STRETCH = 25.0         # see `checks`
-_FAR = 4.0                      # stretch beyond which no rubber stays as straight as one does over some percent
-_NEAR_ZERO = 0.005              # strain of a row that counts as one without strain
-_START = 0.2                    # strain up to which a curve is a straight line over the neo-Hookean law's
-_PRELOAD = (0.05, 0.3)          # of the stress at `_START`, where there is a row without strain, and where the line is lengthened
+_FAR = 4.0                      # stretch beyond which no rubber's curve is as straight as over a few percent
+_NEAR_ZERO = 0.005              # largest strain of a row that counts as unstrained
+_START = 0.2                    # strain up to which a curve is proportional to the neo-Hookean law's
+_PRELOAD = (0.05, 0.3)          # of the stress at `_START`: with an unstrained row, and with an extrapolated line
 _SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of these against that over the last two
-_SLACK = 0.5                    # their ratio; of twelve published curves it is 0.7 and more
+_SLACK = 0.5                    # their ratio; in twelve published curves it is 0.7 and more
 
 
 def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray,
             compression: bool) -> tuple[str, ...]:
-    """Remarks (a tuple of sentences) on a curve; what cannot be right is refused.
+    """Remarks (a tuple of sentences) on a curve; impossible data are refused.
 
     rows: (n,) numbers of the file's rows;  x, y: (n,) stretch and nominal stress, or volume ratio and pressure, in MPa
-    raw: (2, n) the same two columns as the file has them;  compression: the test is stated to be written without a minus
+    raw: (2, n) the same two columns as in the file;  compression: whether the test is stated to be written without a minus
     """
     _check_magnitude(path, rows, x, y, mode, raw)
     _check_sign(path, rows, x, y, mode, raw, compression)
@@ -80,7 +80,7 @@ def refuse_first(path: str | Path, rows: np.ndarray, values: np.ndarray, bad: np
 
 
 def _swapped(raw, mode):
-    """What to add to a refusal where the two columns, swapped, would be a curve of stress and stretch."""
+    """Addition to a refusal where the two columns, swapped, would be a curve of stress and stretch."""
     y, x = raw
     plausible = mode != VOLUMETRIC and (x > 0.05).all() and np.abs(x - 1).min() < 0.3 and (
         (y * np.sign(x - 1)) >= -SIGN_TOLERANCE * np.abs(y).max()).all()
@@ -117,8 +117,8 @@ def _check_sign(path, rows, x, y, mode, raw, compression):
     if mode == VOLUMETRIC:
         refuse_first(path, rows, y, wrong, "the pressure {value} MPa has the wrong sign for its volume ratio;"
                                             " a pressure that compresses is positive, with a volume ratio below 1.")
-    remedy = ("leave `compression` out, for it is no compression test written without a minus" if compression
-              else "say `compression: true` for a compression test written without a minus")
+    remedy = ("leave `compression` out, as it is no compression test written without a minus" if compression
+              else "write `compression: true` for a compression test written without a minus")
     refuse_first(
         path, rows, y, wrong,
         "the stress {value} MPa has the wrong sign for its stretch; tension is positive and compression negative, in strain"
@@ -133,7 +133,7 @@ def _check_units_within(path, rows, x, y):
         growth = np.abs(y[1:] / y[:-1]) / (strain[1:] / strain[:-1])
         growth = np.maximum(growth, 1 / growth)
     jump = (growth > UNIT_JUMP[0]) & (growth < UNIT_JUMP[1])
-    # Noise about zero jumps too, but back: on both sides of a change of unit two rows agree.
+    # Noise about zero jumps, too, but jumps back; on each side of a change of unit two rows agree.
     calm = np.concatenate([[False], growth[:-1] < 10]) & np.concatenate([growth[1:] < 10, [False]])
     refuse_first(path, rows[1:], y[1:], jump & calm,
                   "the stress jumps to {value} MPa, some 1000 times what the row before leads to: are units mixed? Give the whole"
@@ -151,7 +151,7 @@ def remarks(stretch: np.ndarray, stress: np.ndarray, *, mode: str, compression: 
     """Sentences on a curve of shape: stretch (n,), nominal stress (n,) in MPa; `compression`: stated to be without a minus."""
     unit = _unit_of_strain(stretch, stress, mode) or _modulus(stretch, stress, mode)
     found = [unit, _positive_compression(stretch, stress, mode), _negative_tension(stretch, stress, mode) if compression else None]
-    if not any(found):      # of a curve in another unit or of another sign, zero says nothing
+    if not any(found):      # for a curve in another unit or of another sign the checks of zero are meaningless
         found = [_preload(stretch, stress, mode) or _slack(stretch, stress, mode) or _bent(stretch, stress, mode)]
     yield from (remark for remark in found if remark)
 
@@ -169,7 +169,7 @@ def _neo_hooke(mode, stretch):
 
 
 def _unit_of_strain(stretch, stress, mode):
-    """Percent that were called a ratio, or a ratio that was called percent."""
+    """Remark on percent declared as a ratio, or a ratio declared as percent."""
     strain, largest = np.abs(stretch - 1), np.abs(stretch - 1).max()
     percent = (1 + (stretch - 1) / 100, stretch**0.01)      # of engineering or true strain
     as_percent = largest > 0.5 and any(_better(stretch, stress, other, mode) or _all_but_noise(stretch, stress, other, mode)
@@ -179,7 +179,7 @@ def _unit_of_strain(stretch, stress, mode):
         return (f"the stretch goes to {stretch.max():.3g}, and the curve is that of a strain in percent; if the column holds "
                 "percent, name it engineering_strain_percent")
     ratio = 1 + 100 * (stretch - 1)
-    as_ratio = 0 < ratio.min() and 1.2 < ratio.max() < _LARGEST_STRETCH and _better(stretch, stress, ratio, mode)
+    as_ratio = 0 < ratio.min() and 1.2 < ratio.max() < LARGEST_STRETCH and _better(stretch, stress, ratio, mode)
     if as_ratio or largest < 0.02:
         return (f"the largest strain is {largest:.2%}{', and the curve is that of a larger one' if as_ratio else ''}; if the "
                 "column holds a ratio and not percent, name it engineering_strain")
@@ -187,7 +187,7 @@ def _unit_of_strain(stretch, stress, mode):
 
 
 def _better(stretch, stress, other, mode):
-    """Whether the curve follows the law much better over other stretches, and is a rubber's there."""
+    """Whether the curve follows the law much better over other stretches, with the modulus of a rubber."""
     better = _misfit(_neo_hooke(mode, other), stress) < _MUCH_BETTER * _misfit(_neo_hooke(mode, stretch), stress)
     return better and _as_stiff_as_rubber(mode, other, stress)
 
@@ -197,37 +197,37 @@ def _as_stiff_as_rubber(mode, stretch, stress):
 
 
 def _all_but_noise(stretch, stress, other, mode):
-    """Whether a far curve follows Mooney's and Rivlin's law over other stretches but for its noise, and not over those measured."""
+    """Whether a curve to large stretches follows the Mooney-Rivlin law up to noise over other stretches, but not over the given."""
     if stretch.max() < _FAR or not _as_stiff_as_rubber(mode, other, stress):
         return False
-    own, there = (_mooney_misfit(mode, x, stress) for x in (stretch, other))
+    measured, there = (_mooney_misfit(mode, x, stress) for x in (stretch, other))
     noise = _left(np.vander(other - 1, 5), stress)
     largest = np.abs(stress).max()
-    return there <= 1.2 * noise + 0.003 * largest and own**2 - there**2 > (0.006 * largest) ** 2
+    return there <= 1.2 * noise + 0.003 * largest and measured**2 - there**2 > (0.006 * largest) ** 2
 
 
 def _mooney_misfit(mode, stretch, stress):
-    """Root mean square (MPa) of what the law with its two constants, neither of them negative, leaves."""
+    """Root mean square residual (MPa) of the law with two constants, neither of them negative."""
     unit = _neo_hooke(mode, stretch)
     columns = np.column_stack([unit, unit * _second(mode, stretch)])
     return nnls(columns, stress)[1] / np.sqrt(len(stress))
 
 
 def _second(mode, stretch):
-    """What the constant c01 is multiplied by beside c10: the square of the middle principal stretch."""
+    """Factor of the constant c01 relative to c10: the square of the middle principal stretch."""
     return principal_stretches(mode, stretch)[:, 1] ** 2
 
 
 def _left(columns, stress):
-    """Root mean square (MPa) of what a least squares fit leaves."""
+    """Root mean square residual (MPa) of a least squares fit."""
     found = np.linalg.lstsq(columns, stress, rcond=None)[0]
     return float(np.sqrt(np.mean((stress - columns @ found) ** 2)))
 
 
 def _modulus(stretch, stress, mode):
     start = np.abs(stretch - 1) <= 0.5
-    own = start if start.sum() >= 3 else np.full(len(stretch), True)
-    modulus = secant_modulus(mode, stretch[own], stress[own])
+    used = start if start.sum() >= 3 else np.full(len(stretch), True)
+    modulus = secant_modulus(mode, stretch[used], stress[used])
     if 0 < modulus < _MODULI_MPA[0] or modulus > _MODULI_MPA[1]:
         return (f"its shear modulus is {modulus:.3g} MPa, and rubbers have {_MODULI_MPA[0]:g} to {_MODULI_MPA[1]:g} MPa; check the "
                 "units of strain and stress")
@@ -235,7 +235,7 @@ def _modulus(stretch, stress, mode):
 
 
 def _positive_compression(stretch, stress, mode):
-    """A tension curve that steepens from the start, as the same curve in compression would."""
+    """Remark on a tension curve that stiffens from the start, as in compression."""
     if stretch.min() < 0.999 or not 1.05 < stretch.max() < 1.95:
         return None
     as_tension = _misfit(_neo_hooke(mode, stretch), stress)
@@ -247,7 +247,7 @@ def _positive_compression(stretch, stress, mode):
 
 
 def _negative_tension(stretch, stress, mode):
-    """A curve that is stated to be of compression and softens from the start, as tension does."""
+    """Remark on a stated compression curve that softens from the start, as in tension."""
     if stretch.max() > 1.001 or not stretch.min() < 0.95:
         return None
     as_compression = _misfit(_neo_hooke(mode, stretch), stress)
@@ -257,7 +257,7 @@ def _negative_tension(stretch, stress, mode):
 
 
 def _preload(stretch, stress, mode):
-    """Stress at no strain: of the rows without strain, else where the straight line of the first strains meets it."""
+    """Remark on stress without strain: of unstrained rows, else by extrapolation of the straight line of the first strains."""
     strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
     start, none = strain <= _START, strain <= _NEAR_ZERO
     if start.sum() < 3 or strain.min() > 0.05:
@@ -275,7 +275,7 @@ def _preload(stretch, stress, mode):
 
 
 def _slack(stretch, stress, mode):
-    """Strain at no stress: a modulus over the first strains far below that over the next ones."""
+    """Remark on strain without stress: a modulus over the first strains far below that over the next ones."""
     strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
     if strain.min() > _SLACK_STRAINS[0]:
         return None
@@ -289,7 +289,7 @@ def _slack(stretch, stress, mode):
 
 
 def _bent(stretch, stress, mode):
-    """A curve that bends over small strains, where a rubber's is straight over the neo-Hookean law's."""
+    """Remark on a curve that bends over small strains, where a rubber's is proportional to the neo-Hookean law."""
     unit, largest = _neo_hooke(mode, stretch), np.abs(stretch - 1).max()
     if largest > 0.25 or len(stretch) < 8:
         return None
@@ -302,8 +302,8 @@ def _bent(stretch, stress, mode):
 
 def _modulus_between(strain, stress, unit, low, high):
     """Shear modulus (MPa) of the points with a strain between two values; None without any."""
-    own = (strain > low * (1 - 1e-9)) & (strain <= high * (1 + 1e-9)) & (unit != 0)
-    return float(unit[own] @ stress[own] / (unit[own] @ unit[own])) if own.any() else None
+    used = (strain > low * (1 - 1e-9)) & (strain <= high * (1 + 1e-9)) & (unit != 0)
+    return float(unit[used] @ stress[used] / (unit[used] @ unit[used])) if used.any() else None
 
 
 def _loading(stretch):
@@ -312,5 +312,5 @@ def _loading(stretch):
 
 
 def _misfit(unit, stress):
-    """Root mean square (MPa) of what the best multiple of `unit` leaves."""
+    """Root mean square residual (MPa) of the best multiple of `unit`."""
     return float(np.sqrt(np.mean((stress - unit * (unit @ stress) / (unit @ unit)) ** 2))) if unit.any() else np.inf

@@ -134,14 +134,14 @@ class MaterialConfig(Section):
 
 
 def load_material(path: str | Path) -> MaterialConfig:
-    """Read a material's YAML into a `MaterialConfig`; what is wrong is stated in one sentence."""
+    """Read a material's YAML into a `MaterialConfig`; a fault raises an InputError of one sentence."""
     path = Path(path)
     known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
     raw = read_yaml(path, missing=f"there is no such material; known beside it: {known}.")
     config = validated(MaterialConfig, raw, where=str(path))
     try:
         return _resolved(config, path)
-    except InputError as error:     # of laws and constants, which know no file
+    except InputError as error:     # of laws and constants: the message does not name the file
         raise InputError(f"{path}: {error}") from None
 
 
@@ -156,7 +156,7 @@ def validated(model: type[_Model], raw: Any, *, where: str) -> _Model:
 
 
 def _fault(model, field, fault):
-    """What is wrong with a field, and what to do."""
+    """The fault of a field, and its remedy."""
     if fault["type"] == "extra_forbidden":
         *parents, last = fault["loc"]
         fault = unknown(last, known_keys(model, parents), kind="key")
@@ -183,7 +183,7 @@ def _printed_parameters(config, law):
 
 
 def _resolved(config, path):
-    """The config with its curves' constants filled in, and file paths as seen from here."""
+    """The config with its curves' constants filled in, and file paths relative to the working folder."""
     _check_laws(config)
     refuse_idle(config.fit.window, config.fit.weights, modes=config.modes)
     curves = config.curves
@@ -196,7 +196,7 @@ def _resolved(config, path):
 
 
 def _check_laws(config):
-    """Refuse unknown laws and constants now rather than in the middle of a study."""
+    """Refuse unknown laws and constants before a study begins."""
     for name in config.fit.laws if config.fit.laws != "all" else []:
         law_class(name, fitted=True)
     if config.fit.choose != "best":

@@ -1,7 +1,7 @@
 """Whether the laws of one material are stable, and agree with each other.
 
-Two laws can both be stable and both fit "their" data, and still describe different materials: a shear modulus six times
-as large, or five times the stress in compression. Each disagreement becomes a sentence with its numbers.
+Two laws can both be stable and fit their data, and still describe different materials: a shear modulus six times
+as large, or five times the stress in compression. Each disagreement is reported in a sentence with its numbers.
 
 Drucker stability along the paths of simple tests:
 Symbols: l_a principal stretches of the incompressible material, t_a = l_a dpsi/dl_a, T_ab = dt_a/dln l_b.
@@ -22,11 +22,11 @@ from softtact.materials.linear import LinearConstants
 
 SCAN = (0.1, 10.0)
 SCAN_POINTS = 461  # 1 % steps of stretch to both sides of 1
-_BISECTIONS = 12   # of such a step: an end of the range is good to 3e-6
-PRINTED = "Printed constants: "    # begins a card's sentences on what a publication prints
+_BISECTIONS = 12   # of such a step: an end of the range is accurate to 3e-6
+PRINTED = "Printed constants: "    # prefix of a card's sentences on published constants
 # Where the laws are compared: states that the sensor's layers reach under a fingertip's load.
 PROBES = (("uniaxial", 0.5), ("uniaxial", 1.5), ("equibiaxial", 1.3), ("planar", 1.5))
-# What a tensile specimen (ISO 3167) shows; laws that part elsewhere can be fits of one such test.
+# Range of a tensile specimen (ISO 3167); laws that differ elsewhere can be fits of one such test.
 TENSION = np.linspace(1.05, 2.0, 20)
 # Laws fitted to the same curves differ by tens of percent outside them; beyond this factor they are two materials.
 FACTOR = 1.5
@@ -96,7 +96,7 @@ def printed_warnings(printed: Mapping[str, Any], *, bulk_over_shear: float = 20.
 
 
 def disagreements(laws: Mapping[str, Law], *, linear: LinearConstants | None = None, factor: float = FACTOR) -> list[str]:
-    """Sentences on where laws {name: Law} of one material part by more than `factor`.
+    """Sentences on laws {name: Law} of one material that differ by more than `factor`.
 
     linear: `LinearConstants` of the same material, or None
     """
@@ -109,7 +109,7 @@ def disagreements(laws: Mapping[str, Law], *, linear: LinearConstants | None = N
 
 
 def largest_parting_in_tension(laws: Mapping[str, Law]) -> tuple[float, str]:
-    """(ratio, sentence): how far laws {name: Law} of one material part at most, in mu0 and in uniaxial tension to stretch 2."""
+    """(ratio, sentence): largest difference of laws {name: Law} of one material, in mu0 and in uniaxial tension to stretch 2."""
     moduli = {name: law.mu0 for name, law in laws.items()}
     stress = np.array([law.nominal_stress("uniaxial", TENSION) for law in laws.values()])
     ratios = stress.max(axis=0) / stress.min(axis=0)

@@ -24,8 +24,8 @@ class Curve:
     stretch: (n,) stretch of the loaded direction, below 1 in compression
     nominal_stress: (n,) force over undeformed area in MPa, negative in compression
     kind: "measured" or "synthetic"
-    source: file or making, for the record
-    remarks: sentences on what is odd in it, for the card's warnings
+    source: file, or how it was computed, for the record
+    remarks: sentences on its oddities, for the card's warnings
     """
 
     mode: str
@@ -84,7 +84,7 @@ class VolumetricCurve:
 
 
 def join_by_mode(curves: Sequence[Curve | VolumetricCurve]) -> list[Curve | VolumetricCurve]:
-    """One curve per mode, its points sorted: say, a tension and a compression test of the same material."""
+    """One curve per mode, its points sorted; for example from a tension and a compression test of the same material."""
     return [_join([curve for curve in curves if curve.mode == mode]) for mode in dict.fromkeys(c.mode for c in curves)]
 
 
@@ -139,9 +139,9 @@ def refuse_idle(window: Mapping[str, Sequence[float]], weights: Mapping[str, flo
                 fault = unknown(mode, MODES, kind="test mode")
                 raise InputError(f"The {name} of {mode!r}: {fault}{'' if fault.endswith('?') else '.'}")
             if mode not in modes:
-                raise InputError(f"The {name} of {mode} has no effect, for there is no {mode} curve; leave it out.")
+                raise InputError(f"The {name} of {mode} has no effect, as there is no {mode} curve; leave it out.")
     if VOLUMETRIC in weights:
-        raise InputError("The weight of volumetric has no effect, for K is fitted to that curve alone; leave it out.")
+        raise InputError("The weight of volumetric has no effect, as K is fitted to that curve alone; leave it out.")
     if weights and len(set(modes) - {VOLUMETRIC}) == 1:
         raise InputError("The weight of the only mode has no effect; leave it out, or give a second test.")
 

@@ -1,7 +1,7 @@
 """Least squares fit of the family of laws to test curves, with uncertainty.
 
 Every law is linear in its constants of unit MPa and nonlinear in the others (exponents, locking stretch). So a start
-only guesses the nonlinear ones; the linear ones follow from a bounded linear fit, and both are then polished together.
+only guesses the nonlinear ones; the linear ones follow from a bounded linear fit, and both are then refined together.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,11 +21,11 @@ STARTS = 24
 RESIDUALS = ("absolute", "relative")
 # Relative residuals divide by the stress, and near stretch 1 by this share of the curve's largest one.
 _RELATIVE_FLOOR = 0.01
-# Most starts end in a few valleys: some steps show which, and only the best of them are followed to the ground.
+# Most starts end in a few minima: some steps show which, and only the best starts are continued to convergence.
 _COARSE, _PROMISING, _FINAL = 10, 6, 100     # steps, starts, steps
 _SINGULAR = 1e-7        # of the largest singular value: the constants' columns depend on each other
-_TAKES_PART = 0.1       # component of a unit vector of constants that the curves do not see
-_LOOSE_SHARE = 0.05     # of the initial shear modulus: a constant in MPa that is known so well is known, be it zero
+_PARTICIPATES = 0.1       # component of a unit vector of constants that does not change the curves
+_LOOSE_SHARE = 0.05     # of the initial shear modulus: a constant in MPa with a smaller error is identifiable, even if it is zero
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ class LawFit:
     rmse_mpa: over all points;  rmse_by_mode_mpa: {mode: MPa}
     relative_error: root mean square of error over stress;  relative_error_by_mode: {mode: 1}
     autocorrelation: of neighbouring residuals in a curve; near 1 the misfit of the law, near 0 the test's noise
-    aicc: Akaike's criterion corrected for few points; lower is better, constants without use cost
-    at_bound: names of constants that ended on a bound of the search
-    record: of the optimiser: points, starts, those finished and agreeing, evaluations
+    aicc: Akaike's criterion corrected for few points; lower is better, superfluous constants raise it
+    at_bound: names of constants at a bound of the search
+    record: of the optimiser: numbers of points, starts, finished and agreeing starts, evaluations
     """
 
     law: str
@@ -106,7 +106,7 @@ class Points:
 
     @property
     def size(self) -> np.ndarray:
-        """(n,) what relative errors are relative to, MPa."""
+        """(n,) reference stress of relative errors, MPa."""
         return np.maximum(np.abs(self.stress), self.floor)
 
     def by_mode(self, measure: Callable[[np.ndarray], float], values: np.ndarray) -> dict[str, float]:
@@ -132,11 +132,6 @@ def errors_of(law: Law, curves: Sequence[Curve]) -> tuple[float, float]:
     return rms(error), rms(error / points.size)
 
 
-def fit_family(curves: Sequence[Curve], *, laws: str | Sequence[str] = "all", **options: Any) -> dict[str, LawFit]:
-    """{law: LawFit} for a list of law names or "all"; options are those of `FitOptions`."""
-    return {name: fit_law(name, curves, **options) for name in law_names(laws)}
-
-
 def law_names(laws: str | Sequence[str]) -> list[str]:
     """Names of laws from a list of them, one name, or "all"."""
     return list(LAWS) if laws in ("all", ["all"]) else [laws] if isinstance(laws, str) else list(laws)
@@ -151,9 +146,9 @@ def fit_law(name: str, curves: Sequence[Curve], **options: Any) -> LawFit:
             " give more points or choose a law with fewer constants."
         )
     problem = _Problem(kind, points, settings)
-    coarse = [problem.polish(problem.start(guess), _COARSE) for guess in _guesses(problem, settings)]
+    coarse = [problem.refine(problem.start(guess), _COARSE) for guess in _guesses(problem, settings)]
     promising = sorted(coarse, key=lambda solution: solution.cost)[:_PROMISING]
-    final = [problem.polish(solution.x, _FINAL) for solution in promising]
+    final = [problem.refine(solution.x, _FINAL) for solution in promising]
     best = min(final, key=lambda solution: solution.cost)
     record = {
         "points": len(points.stress), "starts": len(coarse), "finished": len(final),
@@ -185,7 +180,7 @@ class _Problem:
         return self.kind(dict(zip(names, (x * self.scale).tolist(), strict=True)), bulk_modulus=1.0)
 
     def residual(self, x):
-        """(n,) errors in stress, weighted, over what they are relative to."""
+        """(n,) weighted errors in stress over their reference stress."""
         return (self.points.predict(self.law(x)) - self.points.stress) * self.per_mpa
 
     def start(self, guess):
@@ -199,7 +194,7 @@ class _Problem:
         return np.clip(x, self.low, self.high)
 
     def _columns(self, x):
-        """(n, linear unknowns): the residual that each of them causes alone at 1."""
+        """(n, linear unknowns): the residual of a unit of each of them alone."""
         zero = -self.residual(x)
         columns = []
         for k in np.flatnonzero(self.linear):
@@ -208,7 +203,7 @@ class _Problem:
             columns.append(self.residual(alone) + zero)
         return np.stack(columns, axis=1)
 
-    def polish(self, x, steps):
+    def refine(self, x, steps):
         bounds = (self.low, self.high)
         return least_squares(self.residual, x, bounds=bounds, x_scale="jac", jac="3-point", max_nfev=steps)
 
@@ -235,7 +230,7 @@ def _stiffness(points):
 
 
 def _guesses(problem, options):
-    """Starts (m, nonlinear unknowns) spread over their bounds, from the logarithm where these span decades; one without any."""
+    """Starts (m, nonlinear unknowns) spread over their bounds, logarithmically where these span decades; one without unknowns."""
     nonlinear = ~problem.linear
     if not nonlinear.any():
         return np.empty((1, 0))
@@ -312,7 +307,7 @@ def _correlation(covariance):
 
 
 def _not_identifiable(law, jacobian, covariance):
-    """Constants whose standard error exceeds them, or that can move together without the curves' notice."""
+    """Constants whose standard error exceeds their value, or that can change together without a change of the curves."""
     values = np.array(list(law.parameters.values()))
     if covariance is None:
         loose = _unseen(jacobian)
@@ -324,8 +319,8 @@ def _not_identifiable(law, jacobian, covariance):
 
 
 def _unseen(jacobian):
-    """Whether each constant takes part in a change of all of them that the curves do not see."""
+    """Whether each constant takes part in a joint change of constants that does not change the curves."""
     size = np.linalg.norm(jacobian, axis=0)
     _, singular, directions = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
     unseen = directions[singular <= _SINGULAR * singular.max()]
-    return (size == 0) | (np.abs(unseen) > _TAKES_PART).any(axis=0)
+    return (size == 0) | (np.abs(unseen) > _PARTICIPATES).any(axis=0)

@@ -15,7 +15,7 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.materials.curves import Curve, VolumetricCurve
 
-# A test of stiffness p/(1-J) that departs from one K by more than this is reported: U has no second constant.
+# A test whose stiffness p/(1-J) differs from a constant K by more than this is reported: U has no second constant.
 _CURVED = 0.05
 
 
@@ -78,7 +78,7 @@ def _small_strain_points(curves, small_strain):
 
 @dataclass(frozen=True)
 class BulkModulus:
-    """K = `modulus_mpa` and its standard error from a test, or K = `over_shear` * mu0 as stated; `source` says which."""
+    """K = `modulus_mpa` and its standard error from a test, or K = `over_shear` * mu0 as stated; `source` names the origin."""
 
     source: str
     modulus_mpa: float | None = None
@@ -92,7 +92,7 @@ class BulkModulus:
 
     @property
     def warnings(self) -> Iterator[str]:
-        """What to say of the test."""
+        """Sentences on faults of the test."""
         if self.misfit > _CURVED:
             yield (f"The volumetric curve is not straight: K (1 - J) leaves {self.misfit:.1%} of its pressure; narrow its window to"
                    " the volume ratios that the sensor reaches.")

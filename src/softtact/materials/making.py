@@ -1,4 +1,4 @@
-"""A material's curve files: made from a law, or gathered from the user's files in one form."""
+"""A material's curve files in one form: computed from a law, or read from the user's files."""
 
 import zlib
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ def make_curves(measured: str | Path | Sequence[str | Path], curves: str | Path 
 
 
 def curves_of(settings: dict[str, Any], *, measured: str | Path | Sequence[str | Path] = ()) -> list[Curve | VolumetricCurve]:
-    """The curves, one per mode, that `MaterialConfig.curve_settings` describe; `measured`: where the user's files are now."""
+    """The curves, one per mode, that `MaterialConfig.curve_settings` describe; `measured`: current paths of the user's files."""
     settings = dict(settings)
     material = settings.pop("material", None)
     if material is None:
@@ -38,7 +38,7 @@ def curves_of(settings: dict[str, Any], *, measured: str | Path | Sequence[str |
 
 
 def _synthetic(material, settings):
-    """Curves from a law; each mode of each material has another noise under the same seed."""
+    """Curves from a law; each mode of each material has other noise under the same seed."""
     options = validated(SyntheticCurves, settings, where=f"material {material}, curves")
     law = make_law(options.law, options.parameters or {}, bulk_over_shear=options.bulk_over_shear)
     return [
@@ -58,7 +58,7 @@ def _measured(material, paths, settings):
 
 
 def _number(text):
-    """A number that stands for a text, the same in every process (Python's `hash` is not)."""
+    """A number for a text, the same in every process (Python's `hash` is not)."""
     return zlib.crc32(text.encode())
 
 

@@ -1,4 +1,4 @@
-"""Readers of test curves. Each refuses what it cannot trust with a sentence naming file, row, value and remedy.
+"""Readers of test curves. Each refuses unreliable data in a sentence with file, row, value and remedy.
 
 Layouts:
   plain          CSV (, ; or tab) or a sheet of Excel, with a header. The names of the columns declare quantity and unit: one of
@@ -8,7 +8,7 @@ Layouts:
   soro_db        the Soft Robotics Materials Database: metadata lines, then `;`-separated columns. Uniaxial.
   stress_stretch two bare columns, nominal stress in MPa first, then stretch (digitised literature data)
   literature     a folder with UT, ET and PS (uniaxial, equibiaxial, planar), each with a stress_stretch.txt
-A curve is one loading branch, as the file has it or sorted; loading and unloading are not mixed.
+A curve is one loading branch, in the file's order or sorted; loading and unloading are not mixed.
 """
 
 import math
@@ -31,8 +31,8 @@ _SORO = {"engineering_strain": _MARKER, "nominal_stress_mpa": "Engineering Stres
 _WHAT = "test curve"
 _BARE = ("nominal_stress_mpa", "stretch")
 _FOLDERS = {"UT": "uniaxial", "ET": "equibiaxial", "PS": "planar"}
-_JITTER = 0.05      # share of the range by which a branch may turn back, as noise of the strain does
-_ROWS = 3           # of a branch, at least and on average; rows in disorder rise or fall over one or two
+_JITTER = 0.05      # share of the range by which a branch may turn back (noise of the strain)
+_ROWS = 3           # of a branch, at least and on average; unordered rows rise or fall over one or two
 _BACK = 2           # rows of the next branch within the range of the one before
 # Name of a column -> its value as stretch, nominal stress in MPa at a stretch, volume ratio, pressure in MPa.
 STRETCHES: dict[str, Callable[[float], float]] = {
@@ -52,7 +52,7 @@ class Reading:
 
     mode: test mode; else taken from the file's `# mode:` line or from a file name such as uniaxial.csv
     columns: {"engineering_strain_percent": "Dehnung [%]", ...} for a plain file with other names in its header
-    sort: order the rows, for a file whose rows are in disorder
+    sort: order the rows, for a file with unordered rows
     compression: a compression test whose strains and stresses are written without a minus; a volumetric test keeps its pressure
     decimal: `.` or `,`;  skip_rows: lines above the header that are passed over;  sheet: of a workbook that has several
     """
@@ -91,19 +91,19 @@ def read_curves(paths: str | Path | Sequence[str | Path], *, mode: str | None = 
     """
     found = stated_files(paths, mode=mode, layout=layout)
     bare = "stress_stretch" if layout == "literature" else layout
-    read = [_read(path, Reading(mode=own, layout=bare, **options)) for path, own in found]
+    read = [_read(path, Reading(mode=stated, layout=bare, **options)) for path, stated in found]
     _refuse_unused(options.get("columns") or {}, [header for _, header in read])
     return [curve for curve, _ in read]
 
 
 def stated_files(paths: str | Path | Sequence[str | Path], *, mode: str | None = None,
                  layout: str = "plain") -> list[tuple[Path, str | None]]:
-    """[(file, its mode or None)] of what `read_curves` is given; a mode that would change nothing is refused."""
+    """[(file, its mode or None)] of the arguments of `read_curves`; a mode without effect is refused."""
     paths = [paths] if isinstance(paths, (str, Path)) else paths
     found = [pair for path in paths for pair in (_in_folder(path) if layout == "literature" else [_stated_mode(path, mode)])]
-    own = layout == "literature" or not any(path == Path(given) for given, (path, _) in zip(paths, found, strict=False))
-    if mode is not None and own:
-        raise InputError(f"the mode {mode} for all files has no effect, for each states one; leave it out.")
+    each_stated = layout == "literature" or not any(path == Path(given) for given, (path, _) in zip(paths, found, strict=False))
+    if mode is not None and each_stated:
+        raise InputError(f"the mode {mode} for all files has no effect, as each states one; leave it out.")
     return found
 
 
@@ -115,7 +115,7 @@ def _read(path, reading):
     rows, values, raw = _values(table, reading, mode)
     remarks = checked(path, rows, *values, mode=mode, raw=raw, compression=reading.compression)
     x, y = order(path, rows, *values, mode=mode, sort=reading.sort)
-    # A file that names its source is of the project: what is unusual in its origin is noted in it.
+    # A file that names its source was written by softtact: remarks on its origin are noted in it.
     record = {"kind": notes.get("kind", "measured"), "source": notes.get("source", Path(path).name),
               "remarks": _remarks(table) if "source" in notes else remarks}
     return VolumetricCurve(x, y, **record) if mode == VOLUMETRIC else Curve(mode, x, y, **record), table.header
@@ -125,7 +125,7 @@ def _table(path, reading):
     """The file's `Table`."""
     if reading.layout == "stress_stretch":
         if reading.sheet is not None:
-            raise InputError(f"{path}: it has no sheet {reading.sheet!r}, for it is a text; leave `sheet` out.")
+            raise InputError(f"{path}: it has no sheet {reading.sheet!r}, as it is a text file; leave `sheet` out.")
         return read_bare(path, what=_WHAT, header=_BARE, decimal=reading.decimal, skip_rows=reading.skip_rows)
     marked = {"marker": _MARKER, "layout": "soro_db"} if reading.layout == "soro_db" else {}
     return read_table(path, what=_WHAT, decimal=reading.decimal, skip_rows=reading.skip_rows, sheet=reading.sheet, **marked)
@@ -202,19 +202,19 @@ def _value(path, row, value, convert):
 
 
 def _with_minus(path, rows, x, y, name):
-    """A compression test written with positive numbers, with its signs. A pressure that compresses is positive anyway."""
+    """A compression test written with positive numbers, with signs. A compressing pressure is always positive."""
     strain = name not in ("stretch", "volume_ratio")
     if strain and x.min() < 0 < x.max():
         row = rows[np.argmax(x < 0)]
-        raise InputError(f"{path}, row {row}: it has strains of both signs, so its signs are written; leave `compression` out.")
+        raise InputError(f"{path}, row {row}: it has strains of both signs, so it is written with signs; leave `compression` out.")
     return (-np.abs(x) if strain else x), (y if name in VOLUMES else -np.abs(y))
 
 
 def _refuse_unused(columns, headers):
     """Refuse a name that `columns` maps to and that no file's header holds."""
-    for name, own in columns.items():
-        if not any(own in header for header in headers):
-            raise InputError(f"`columns` maps {name} to {own!r}, which no file has in its header ({', '.join(headers[0])}); "
+    for name, mapped in columns.items():
+        if not any(mapped in header for header in headers):
+            raise InputError(f"`columns` maps {name} to {mapped!r}, which no file has in its header ({', '.join(headers[0])}); "
                              "correct it, or leave it out.")
 
 
@@ -222,8 +222,8 @@ def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, m
           sort: bool) -> tuple[np.ndarray, np.ndarray]:
     """x and y in rising or falling order: as they are, or sorted.
 
-    A file with loading and unloading is refused in both cases, for a law has one stress at a stretch, and a sorted file would be
-    fitted in the middle between both.
+    A file with loading and unloading is refused in both cases: a law has one stress at a stretch, and the fit of a sorted file
+    would lie between both branches.
     """
     name = "volume ratio" if mode == VOLUMETRIC else "stretch"
     if x.min() == x.max():
@@ -238,15 +238,15 @@ def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, m
     steps, forward = np.diff(x), np.sign(x[-1] - x[0])
     refuse_first(
         path, rows[1:], x[1:], steps * forward < 0 if forward else steps != 0,
-        f"the {name} turns back to {{value}}; keep one loading branch, or say `sort: true` if its rows are in disorder.",
+        f"the {name} turns back to {{value}}; keep one loading branch, or write `sort: true` if its rows are unordered.",
     )  # fmt: skip
     return x, y
 
 
 def _unloading(x):
-    """Index of the row where the first branch turns back over the range that it came through; None where none does.
+    """Index of the row at which the first branch turns back over its range; None where none does.
 
-    Rows in disorder have no branches: they turn every second row.
+    Unordered rows have no branches: they turn at every second row.
     """
     turns = _turns(x)
     if len(x) / (len(turns) - 1) < _ROWS:
@@ -260,7 +260,7 @@ def _unloading(x):
 
 
 def _turns(x):
-    """Indices of the ends and of the extremes between them, of which each is further than jitter from the last."""
+    """Indices of the ends and of the extremes between them, each farther from the last than the jitter."""
     least = _JITTER * (x.max() - x.min())
     turns, extreme, direction = [0], 0, 0
     for k in range(1, len(x)):
@@ -287,7 +287,7 @@ NAMES = (*STRETCHES, *STRESSES, *VOLUMES, *PRESSURES)
 
 _BASES = ("nominal_stress", "true_stress", "pressure")      # quantities whose name has no unit
 _PERCENT = {"engineering_strain": "engineering_strain_percent", "volumetric_strain": "volumetric_strain_percent"}
-# As they are written: a unit's letters are not folded, for mPa is no MPa.
+# Case matters: mPa is not MPa.
 _UNITS = {"MPa": "mpa", "MPA": "mpa", "mpa": "mpa", "N/mm2": "mpa", "N/mm^2": "mpa", "N/mm\N{SUPERSCRIPT TWO}": "mpa",
           "kPa": "kpa", "KPa": "kpa", "kpa": "kpa", "kN/m2": "kpa", "kN/m^2": "kpa", "kN/m\N{SUPERSCRIPT TWO}": "kpa",
           "Pa": "pa", "pa": "pa", "N/m2": "pa", "N/m^2": "pa", "N/m\N{SUPERSCRIPT TWO}": "pa",
@@ -302,7 +302,7 @@ class Declared:
 
 
 def find_columns(table: Table, *, mode: str, columns: Mapping[str, str]) -> tuple[list[Declared], int]:
-    """The two columns of a curve's table, stretch and stress, or volume and pressure; and how many rows of units are below.
+    """The two columns of a curve's table, stretch and stress, or volume and pressure; and the number of rows of units below.
 
     columns: {name: that in the file}
     """
@@ -345,12 +345,12 @@ def _units_below(table, found):
     if not table.rows:
         return None
     row, cells = table.rows[0]
-    own = [cells[column.at] for column in found]
-    return (row, own) if any(own) and not any(_like_a_number(cell) for cell in own) else None
+    texts = [cells[column.at] for column in found]
+    return (row, texts) if any(texts) and not any(_like_a_number(cell) for cell in texts) else None
 
 
 def _like_a_number(cell: Cell) -> bool:
-    """Whether a cell is a number, be it one that is not understood, such as `1,5` or nan."""
+    """Whether a cell is a number, even one that cannot be read, such as `1,5` or nan."""
     return isinstance(cell, float) or re.match(r"[+-]?[.,]?\d|[+-]?(nan|inf)", cell.strip(), flags=re.IGNORECASE) is not None
 
 

@@ -16,9 +16,9 @@ from softtact.sensors.frusta import Friction, SensorSpec
 from softtact.sensors.specification import AnySpec
 
 _POINTS = 1881  # of the paper's map
-_FOUNDATION_TAKES = 30, 1.5     # seconds for that, and the power of a map's points with which they grow
+_FOUNDATION_TAKES = 30, 1.5     # seconds for the paper's map, which grow with this power of the number of a map's points
 _FRUSTUM_TAKES = 20     # seconds
-_FORMAT = 12    # of the files; another one makes them again
+_FORMAT = 12    # of the files; a new number computes them again
 
 
 def _of_layer(spec):
@@ -33,14 +33,14 @@ def _of_frusta(spec):
 
 
 def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
-    """The elastic layer's `Compliance`, by the values that it depends on."""
+    """The elastic layer's `Compliance`; cached by the values that it depends on."""
     return _cached("compliance", _of_layer(spec), Compliance,
                    f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 4, 2.0)})",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
 def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
-    """The elastic layer's `SurfaceCompliance`, by the values that it depends on."""
+    """The elastic layer's `SurfaceCompliance`; cached by the values that it depends on."""
     return _cached("surface", _of_layer(spec), SurfaceCompliance,
                    f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor "
                    f"({_about(spec, 12, 2.0)}; 230 MB for the paper's)",
@@ -48,7 +48,7 @@ def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceComp
 
 
 def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
-    """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values that it depends on."""
+    """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}; cached by the values that it depends on."""
     return _cached("foundation", _of_foundation(spec, laws), FoundationCompliance,
                    f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
                    f"({_about(spec, *_FOUNDATION_TAKES)})",
@@ -57,7 +57,7 @@ def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int
 
 
 def cached_frustum_law(spec: SensorSpec, law: Law) -> FrustumLaw:
-    """The `FrustumLaw` of a sensor's frusta with bonded tips, by the values that it depends on."""
+    """The `FrustumLaw` of a sensor's frusta with bonded tips; cached by the values that it depends on."""
     bonded = spec.model_copy(update={"tips_bonded": True, "friction": Friction()})
     return _cached("frustum", [repr(spec.dielectric.frusta), spec.dielectric.sheet_thickness_mm, repr(law)], FrustumLaw,
                    f"{spec.name}: computing the law of a frustum, once for frusta of this kind ({in_words(_FRUSTUM_TAKES)})",

@@ -25,25 +25,25 @@ from softtact.press.fast import press_elastic, press_on_foundation
 from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult
-from softtact.press.task import Course
+from softtact.press.task import RunControl
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 POLICIES = ("error", "paper")
 # The models that press straight down by force: from a placed object and forces to a `PressResult`.
-PRESSES: dict[str, Callable[["Sensor", Trimesh, np.ndarray, Course], PressResult]] = {
+PRESSES: dict[str, Callable[["Sensor", Trimesh, np.ndarray, RunControl], PressResult]] = {
     "elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
 # The numbers below come from random contacts on this sensor (benchmarks/expected_error.py, benchmarks/results/expected_error.json).
 CALIBRATED_ON = "coro"
-ELASTIC_RELATIVE = 0.45     # of its map's root mean square: the elastic model's error where no foundation model is beside it
-# True over expected error from the 10th to the 90th percentile: of the foundation model, objects left out in turn (of objects that
-# nothing was fitted to 7 % lie above); of the elastic model from what both models disagree by; and, from the 5th to the 95th, of
-# the elastic model by itself (0.311 to 0.760 over 0.45).
+ELASTIC_RELATIVE = 0.45     # the elastic model's error over its map's root mean square, without a press by the foundation model
+# True error over expected error, 10th to 90th percentile: of the foundation model, fitted with objects left out in turn (7 % of the
+# presses of objects outside of the fit lie above); of the elastic model with its error from the difference of both models; and, 5th
+# to 95th percentile, of the elastic model alone (0.311 to 0.760 over 0.45).
 INTERVALS = {"foundation": (0.80, 1.64), "elastic": (0.98, 1.05), "elastic alone": (0.69, 1.68)}
 _POWER, _DEPTH_POWER = 3, 2      # of the compression and of the depth, with which the foundation model's relative error grows
-_LONGEST_S = 120.0     # of a preparation that nobody has asked for by its model's name
-_KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not known much beyond
+_LONGEST_S = 120.0     # preparation of a model that the user did not name
+_LARGEST_COMPRESSION = 0.5     # of a frustum's height, with a known error; calibrated up to 0.36
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class FoundationError:
     """Expected error of the foundation model over its map's root mean square.
 
     It is `at_rest` + `growth` (compression / frustum's height)^3 + `deep` (depth / sensor's thickness)^2, of the most compressed
-    frustum and of the object's indentation. The values given here: benchmarks/expected_error.py.
+    frustum and of the object's indentation. Source of the default values: benchmarks/expected_error.py.
     """
 
     at_rest: float = 0.0306
@@ -72,7 +72,7 @@ def rms(maps_mm: np.ndarray) -> np.ndarray:
 def calibrate(relative: np.ndarray, compression: np.ndarray, depth: np.ndarray | None = None) -> FoundationError:
     """`FoundationError` from true errors over the maps' root mean squares (n,), compressions (n,) and depths (n,) as for it.
 
-    Least squares with weights that make each error relative to the true one; no constant is below zero. Without depths `deep` is 0.
+    Least squares of the errors relative to the true ones; no constant is below zero. Without depths `deep` is 0.
     """
     from scipy.optimize import nnls
 
@@ -86,19 +86,19 @@ def foundation_error(foundation: PressResult, *, height_mm: float, thickness_mm:
                      model: FoundationError = FoundationError()) -> np.ndarray:
     """Expected errors (l,) in mm of a press with the foundation model, or a data set with its names.
 
-    Infinite where frusta are compressed much further than in any press that the error was calibrated on.
+    Infinite where frusta are compressed much more than in the presses of the calibration.
     """
     compression = np.asarray(foundation.frustum_compression_mm) / height_mm
     expected = model(foundation.deformation_map_mm, compression, np.asarray(foundation.indentation_mm) / thickness_mm)
-    return np.where(compression < _KNOWN, expected, np.inf)
+    return np.where(compression < _LARGEST_COMPRESSION, expected, np.inf)
 
 
 def expected_errors(elastic: PressResult, foundation: PressResult, *, height_mm: float, thickness_mm: float,
                     model: FoundationError = FoundationError()) -> dict[str, np.ndarray]:
     """{model: errors (l,) in mm} of two `PressResult`s, or data sets with their names, of the same press."""
-    ours = foundation_error(foundation, height_mm=height_mm, thickness_mm=thickness_mm, model=model)
-    apart = rms(np.asarray(elastic.deformation_map_mm) - np.asarray(foundation.deformation_map_mm))
-    return {"elastic": np.hypot(apart, ours), "foundation": ours}
+    of_foundation = foundation_error(foundation, height_mm=height_mm, thickness_mm=thickness_mm, model=model)
+    difference = rms(np.asarray(elastic.deformation_map_mm) - np.asarray(foundation.deformation_map_mm))
+    return {"elastic": np.hypot(difference, of_foundation), "foundation": of_foundation}
 
 
 def cheapest(errors: dict[str, np.ndarray], tolerance_mm: float) -> str:
@@ -126,39 +126,39 @@ def _with_interval(result, name):
         "expected_error_times_low": low, "expected_error_times_high": high, "expected_error_calibrated_on": CALIBRATED_ON})
 
 
-def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course, *, policy: str,
+def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl, *, policy: str,
                tolerance_mm: float) -> PressResult:
     """A press with the model that a policy chooses; the result states the model, the reason and the expected error."""
     if policy not in POLICIES:
         raise InputError(f"The policy {policy!r} is unknown; use one of {', '.join(POLICIES)}.")
     if policy == "paper":
-        return _by_counts(sensor, placed, forces, course)
+        return _by_counts(sensor, placed, forces, control)
     if not tolerance_mm > 0:
         raise InputError(f"The tolerance {tolerance_mm:g} mm is not positive; give the largest error of a map in mm.")
-    reason = _why_not_fast(sensor)
+    reason = _reason_against_fast_models(sensor)
     if reason:
-        result = PRESSES["hyperelastic"](sensor, placed, forces, course)
+        result = PRESSES["hyperelastic"](sensor, placed, forces, control)
         return replace(result, selection_reason=f"{reason}: the hyperelastic model", expected_error_mm=np.zeros(len(forces)))
-    return _by_error(sensor, placed, forces, tolerance_mm, course)
+    return _by_error(sensor, placed, forces, tolerance_mm, control)
 
 
-def _by_counts(sensor, placed, forces, course):
+def _by_counts(sensor, placed, forces, control):
     counts = score(placed.triangles, footprint_mm=sensor.spec.footprint_mm, reach_mm=sensor.spec.thickness_mm)
     model = choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
-    result = PRESSES[model](sensor, placed, forces, course)
+    result = PRESSES[model](sensor, placed, forces, control)
     reason = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
               f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
     return replace(result, selection_reason=reason)
 
 
 def models_to_prepare(sensor: "Sensor", *, policy: str) -> tuple[str, ...]:
-    """Names of the fast models that a policy may press."""
+    """Names of the fast models that a policy may use."""
     if not sensor.spec.has_layers:
         return ()
-    return ("elastic",) if policy == "paper" else () if _why_not_fast(sensor) else ("elastic", "foundation")
+    return ("elastic",) if policy == "paper" else () if _reason_against_fast_models(sensor) else ("elastic", "foundation")
 
 
-def _why_not_fast(sensor):
+def _reason_against_fast_models(sensor):
     """The reason in words why the fast models' errors are not computed; empty if they are."""
     if np.isnan(sensor.spec.frustum_height_mm):
         return f"{sensor.spec.name} has no frusta, on which the expected errors were calibrated"
@@ -169,9 +169,9 @@ def _why_not_fast(sensor):
             "(a press by --model foundation does it)")
 
 
-def _by_error(sensor, placed, forces, tolerance_mm, course):
+def _by_error(sensor, placed, forces, tolerance_mm, control):
     start = time.monotonic()
-    pressed, remarks = _fast_presses(sensor, placed, forces, course)
+    pressed, remarks = _fast_presses(sensor, placed, forces, control)
     errors = _errors_of(sensor, pressed)
     for name, result in pressed.items():
         if not result.within_validity.all():
@@ -183,28 +183,28 @@ def _by_error(sensor, placed, forces, tolerance_mm, course):
     in_um = [f"{name} {1e3 * values.max():.3g} (90 % below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()
             if np.isfinite(values).all()]
     reason = "; ".join([f"expected errors: {', '.join(in_um)}; asked for {1e3 * tolerance_mm:.3g} um" if in_um else
-                        "no fast model tells an error", *remarks])
+                        "no fast model gives an error", *remarks])
     if sensor.spec.name != CALIBRATED_ON:
         reason += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     spent = sum(result.wall_time_s for result in pressed.values())
     if model != "hyperelastic":
         return replace(pressed[model], selection_reason=reason, expected_error_mm=errors[model], wall_time_s=spent)
-    if course.time_limit_s is not None:      # the fast presses took some of it
-        course = replace(course, time_limit_s=course.time_limit_s - (time.monotonic() - start))
-    result = PRESSES[model](sensor, placed, forces, course)
+    if control.time_limit_s is not None:      # less the time of the fast presses
+        control = replace(control, time_limit_s=control.time_limit_s - (time.monotonic() - start))
+    result = PRESSES[model](sensor, placed, forces, control)
     if not result.within_validity.all():
         reason += "; none serves: the hyperelastic model does not hold either at the flagged load steps"
     return replace(result, selection_reason=reason, expected_error_mm=np.zeros(len(forces)), wall_time_s=result.wall_time_s + spent)
 
 
-def _fast_presses(sensor, placed, forces, course):
-    """{model: result} of the fast models that reach all forces, and a remark on each of those that do not."""
+def _fast_presses(sensor, placed, forces, control):
+    """{model: result} of the fast models that reach all forces, and a remark on each of the others."""
     pressed, remarks = {}, []
     for name in ("elastic", "foundation"):
         try:
-            with warnings.catch_warnings():      # the model that is taken warns of the shell once
+            with warnings.catch_warnings():      # the chosen model warns of the shell
                 warnings.simplefilter("ignore", ShellWarning)
-                pressed[name] = PRESSES[name](sensor, placed, forces, replace(course, reached=Reached()))
+                pressed[name] = PRESSES[name](sensor, placed, forces, replace(control, reached=Reached()))
         except TimeLimitError:
             raise
         except ConvergenceError as error:

@@ -20,20 +20,20 @@ from softtact.models.foundation.solve import FoundationMaps, lifted, press_found
 from softtact.press.cache import cached_surface_compliance
 from softtact.press.making import make_result, shell_of, valid_elastic, valid_foundation, warn_of_shell
 from softtact.press.result import PressResult
-from softtact.press.task import Course
+from softtact.press.task import RunControl
 from softtact.progress import Watch
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 _ROUND_OFF = 1e-6         # of a force
-_NEAR_MM = 0.1            # height over the sensing surface, or depth below it, from which an object is set down first
+_NEAR_MM = 0.1            # height over the sensing surface, or depth below it, beyond which an object is moved to first touch
 
 
-def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
-    """All load steps at once with the elastic model, which has only the surface's compliance and no body to keep."""
+def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl) -> PressResult:
+    """Press all load steps at once with the elastic model, which has only the surface's compliance and no body to keep."""
     start = time.perf_counter()
-    sensor.prepared("elastic", course.threads)
+    sensor.prepared("elastic", control.threads)
     surface = HeightField(placed)
     touch = first_touch_mm(sensor, surface)
     press = _elastic(sensor, surface, forces, touch)
@@ -42,41 +42,41 @@ def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course:
 
 
 def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, *, model: str) -> np.ndarray:
-    """Maps (l, ny, nx) in mm of a sensor's reduction of thickness at rising forces (N), from which its readings follow.
+    """Maps (l, ny, nx) in mm of the decrease in thickness of a sensor at rising forces (N), from which its readings follow.
 
     surface: the underside of an object;  model: elastic or foundation
-    Raises InputError where the object is beside the sensor, ConvergenceError for a force that is not reached.
+    Raises InputError where the object misses the sensor, ConvergenceError for a force that is not reached.
     """
     if model == "foundation":
-        near = _set_down(sensor, surface)
-        return _on_foundation(sensor, near, forces_n, Course(label=""), time.perf_counter()).deformation_map_mm
+        near = _near_touch(sensor, surface)
+        return _on_foundation(sensor, near, forces_n, RunControl(label=""), time.perf_counter()).deformation_map_mm
     press = _elastic(sensor, surface, forces_n, first_touch_mm(sensor, surface), patches=True)
-    warn_of_shell(sensor.spec, forces_n, _exactly(forces_n, press.contact.force.sum(axis=0)))
+    warn_of_shell(sensor.spec, forces_n, _snapped(forces_n, press.contact.force.sum(axis=0)))
     return press.maps if press.lower_maps is None else press.maps - press.lower_maps
 
 
 def _elastic(sensor, surface, forces, touch, *, patches=False):
-    """The `LayerPress` of an object given by its underside; touch: descent to first touch."""
+    """The `LayerPress` of an object by its underside; touch: descent to first touch."""
     compliance = sensor.prepared("elastic")
     underside, stop = Underside(surface, compliance.grid), shell_stop_mm(sensor, surface)
 
     def solve(points):
-        if (alone := _not_as_deep(lambda: press_layer(compliance, points, forces, patches=patches), stop)) is not None:
+        if (alone := _above_shell(lambda: press_layer(compliance, points, forces, patches=patches), stop)) is not None:
             return alone
         on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
                             depth_of=lambda force: press_layer(compliance, points, [force], patches=patches).contact.depth[0])
         return (press_layer(compliance, points, on_pad, patches=patches) if on_pad.any()
                 else rest_on_shell(compliance, points, len(forces), stop))
 
-    return _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
+    return _of_candidates(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
                          lambda press: press.contact.depth[-1])[1]
 
 
-def _not_as_deep(press, stop_mm):
-    """What `press` makes of all forces on the pad, where the object does not come down to the shell; else None."""
+def _above_shell(press, stop_mm):
+    """The result of `press` with all forces on the pad, if the object stays above the shell; else None."""
     try:
         found = press()
-    except ConvergenceError:     # of a force that the pad would not bear alone
+    except ConvergenceError:     # a force that the pad cannot carry alone
         if np.isinf(stop_mm):
             raise
         return None
@@ -94,11 +94,11 @@ def shell_stop_mm(sensor: "Sensor", surface: HeightField) -> float:
 
 
 def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *, touch_mm: float) -> PressResult:
-    """The result of a `LayerPress`; touch_mm: how far the object comes down until it touches."""
+    """The result of a `LayerPress`; touch_mm: descent of the object to first touch."""
     contact, unknown, thickness = press.contact, np.full(len(forces), np.nan), sensor.spec.thickness_mm
     depth = contact.depth - touch_mm
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=depth,
-                       pad_force_n=_exactly(forces, contact.force.sum(axis=0)),
+                       pad_force_n=_snapped(forces, contact.force.sum(axis=0)),
                        contact_area_mm2=press.areas @ (contact.force > 0),
                        penetration_mm=contact.penetration,
                        within_validity=valid_elastic(depth, thickness_mm=thickness),
@@ -106,38 +106,38 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
                        lower_maps=press.lower_maps, iterations=contact.iterations)
 
 
-def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
-    """Load step by load step with the foundation model, which has no body to keep."""
+def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl) -> PressResult:
+    """Press load step by load step with the foundation model, which has no body to keep."""
     start = time.perf_counter()
-    sensor.prepared("foundation", course.threads)
-    return _on_foundation(sensor, _set_down(sensor, HeightField(placed)), forces, course, start)
+    sensor.prepared("foundation", control.threads)
+    return _on_foundation(sensor, _near_touch(sensor, HeightField(placed)), forces, control, start)
 
 
-def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, course: Course, start: float) -> PressResult:
-    """The result for an object by its underside, near the sensing surface."""
+def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, control: RunControl, start: float) -> PressResult:
+    """The result for an object by its underside, which is near the sensing surface."""
     compliance = sensor.prepared("foundation")
     underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
     load_steps: list[Any] = []
-    watch = Watch(limit_s=course.time_limit_s)
+    watch = Watch(limit_s=control.time_limit_s)
 
     def record(load_step):
         watch.report(f"{load_step.force_n:.4g} N")
         load_steps.append(load_step)
 
     def so_far(points):
-        return _of_load_steps(sensor, compliance, points, load_steps, forces, course.reached.times, touch)
+        return _of_load_steps(sensor, compliance, points, load_steps, forces, control.reached.times, touch)
 
     def solve(points):
         load_steps.clear()
-        course.reached.follow(map(record, _steps_on_pad(compliance, points, forces, stop, touch)), len(forces),
-                              partial(so_far, points), label=course.label, start=start)
+        control.reached.follow(map(record, _steps_on_pad(compliance, points, forces, stop, touch)), len(forces),
+                               partial(so_far, points), label=control.label, start=start)
 
-    points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
-                              lambda _: load_steps[-1].depth)
+    points, _ = _of_candidates(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
+                               lambda _: load_steps[-1].depth)
     return so_far(points)
 
 
-def _set_down(sensor: "Sensor", surface: HeightField) -> HeightField:
+def _near_touch(sensor: "Sensor", surface: HeightField) -> HeightField:
     """The underside moved to first touch if it is far away, since the model's first guesses start at the sensing surface."""
     away = first_touch_mm(sensor, surface)
     return surface if abs(away) <= _NEAR_MM else surface.moved(np.array([0.0, 0.0, -away]))
@@ -149,7 +149,7 @@ def _steps_on_pad(compliance, points, forces, stop, touch):
     while reached < len(forces):
         try:
             step = next(steps)
-        except ConvergenceError:     # of a force that the pad would not bear alone
+        except ConvergenceError:     # a force that the pad cannot carry alone
             if np.isinf(stop):
                 raise
             break
@@ -166,7 +166,7 @@ def _steps_on_pad(compliance, points, forces, stop, touch):
         yield rest
 
 
-def _exactly(forces, found):
+def _snapped(forces, found):
     """The prescribed forces (l,) where the computed ones agree with them to rounding, else the computed ones (l,)."""
     return np.where(np.abs(found - forces) <= _ROUND_OFF * forces, forces, found)
 
@@ -189,10 +189,10 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
                        **numbers)
 
 
-def _within_reach(underside, points_within, foundation_modulus, forces, deepest, solve, depth_of):
-    """Candidate points within the expected depth, and the result of `solve` for them; repeated with more points if it is deeper.
+def _of_candidates(underside, points_within, foundation_modulus, forces, deepest, solve, depth_of):
+    """Candidate contact points within the expected depth, and the result of `solve` for them; repeated with more points if deeper.
 
-    Beside the object the surface rises, so points slightly above its depth can touch too.
+    Beside the object the surface rises, so points slightly above the object's depth can touch, too.
     """
     reach = REACH * underside.depth_on_springs(forces[-1], foundation_modulus) + LEAST_REACH_MM
     while True:
@@ -208,18 +208,18 @@ def _within_reach(underside, points_within, foundation_modulus, forces, deepest,
 _OF_MOTION = ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations", "contact_area_mm2", "penetration_mm")
 
 
-def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, course: Course) -> PressResult:
-    """Step by step with the elastic model, which has no body to keep."""
+def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, control: RunControl) -> PressResult:
+    """Press step by step along a motion with the elastic model, which has no body to keep."""
     if not sensor.spec.base_held:
         raise InputError(f"{sensor.spec.name} has support 'none', which the elastic model presses straight down by force only; use "
                          "the hyperelastic model for this motion.")
     seconds: list[float] = []
     try:
-        moved = move_elastic(sensor, placed, motion, seconds, label=course.label, threads=course.threads,
-                             limit_s=course.time_limit_s)
+        moved = move_elastic(sensor, placed, motion, seconds, label=control.label, threads=control.threads,
+                             limit_s=control.time_limit_s)
     except ConvergenceError as error:
         if isinstance(before := error.result, ElasticMotion):
-            course.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds))
+            control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds))
         raise
     return _of_motion(sensor, moved, seconds)
 
@@ -229,7 +229,7 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
     """The `ElasticMotion` of a mesh placed in the sensor's frame; the time of each step is appended to `seconds`.
 
     Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
-    its `result`, where one is not reached.
+    its `result`, for a step that is not reached.
     """
     check_motion(motion)
     if "elastic_surface" not in sensor.prepared_models:

@@ -15,34 +15,34 @@ from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.press.making import make_result, shell_of, valid_hyperelastic
 from softtact.press.result import PressResult
-from softtact.press.task import Course
+from softtact.press.task import RunControl
 from softtact.progress import Watch, announce
 from softtact.readout.registry import Samples
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_CORNER = 0.01            # share of a layer that may exceed the data: strains at an edge of the object always do
+_CORNER = 0.01            # share of a layer that may exceed the data: strains at an edge of the object always exceed them
 
 
-def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, course: Course) -> PressResult:
-    """Load step by load step with the hyperelastic model, of forces (l,) in N or a `Motion`.
+def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, control: RunControl) -> PressResult:
+    """Press load step by load step with the hyperelastic model, by forces (l,) in N or a `Motion`.
 
-    A ConvergenceError, of which a time limit is one, and an interruption of the keyboard hold the load steps before.
+    A ConvergenceError, which a time limit raises too, and a KeyboardInterrupt hold the load steps before.
     """
     surface = HeightField(placed)
     touch = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):
         path.check_motion(forces)
-    body = sensor.body(threads=course.threads, surface=_swept(surface, forces))
-    if course.label:
-        announce(f"{course.label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model")
-    body.watch = Watch(course.label, limit_s=course.time_limit_s)
-    record = _Record(sensor, body, touch, course)
+    body = sensor.body(threads=control.threads, surface=_swept(surface, forces))
+    if control.label:
+        announce(f"{control.label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model")
+    body.watch = Watch(control.label, limit_s=control.time_limit_s)
+    record = _Record(sensor, body, touch, control)
     load_steps = map(record.take, _allowed(_load_steps(sensor, body, surface, forces, touch), sensor, surface, forces, touch))
     try:
-        course.reached.follow(load_steps, count, record.result)
+        control.reached.follow(load_steps, count, record.result)
         return record.result()
     finally:
         body.watch.end()
@@ -79,15 +79,15 @@ def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
     if depth > thickness_mm:
         raise ConvergenceError(
             f"The load step of {load_step.force_n:g} N was not reached: the object's tip would be {depth:.3g} mm deep in a sensor "
-            f"{thickness_mm:g} mm thick, for it slips in between the points of the cover that feel contact. Ask for smaller "
+            f"{thickness_mm:g} mm thick, as it slips between the contact points of the cover. Ask for smaller "
             "forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
 
 
 class _Record:
     """The numbers of a press' load steps, and the bodies if they are kept."""
 
-    def __init__(self, sensor, body, touch_mm, course):
-        self._sensor, self._body, self._touch_mm, self._course = sensor, body, touch_mm, course
+    def __init__(self, sensor, body, touch_mm, control):
+        self._sensor, self._body, self._touch_mm, self._control = sensor, body, touch_mm, control
         self._grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
         self._sampling = body.slab.sampling(self._grid)
         self._lower = None if sensor.spec.base_held else lower_side(body.slab, self._grid)
@@ -98,12 +98,12 @@ class _Record:
         """Record the numbers of a load step; its time is recorded by the caller."""
         maps = self._sampling, self._lower, self._grid
         self._steps.append(_read_load_step(self._body, maps, load_step, from_mm=self._touch_mm))
-        if self._course.keep_body:
+        if self._control.keep_body:
             self._bodies.append(pressed_body(self._body, load_step.state))
 
     def result(self):
         """The `PressResult` of the load steps whose time is recorded: an interruption may come just before that."""
-        sensor, times = self._sensor, self._course.reached.times
+        sensor, times = self._sensor, self._control.reached.times
         steps = self._steps[:len(times)]
         pressure = [load_step["pressure"] for load_step in steps]
         numbers = {name: np.array([load_step[name] for load_step in steps]) for name in steps[0] if name != "pressure"}
@@ -134,8 +134,8 @@ def _warn_extrapolation(shares, forces):
 def _read_load_step(body, maps, load_step, *, from_mm):
     """The numbers of a load step by their names in a result; fields over the map's points (y * x,).
 
-    maps: what samples the map's plane, what samples a free lower side (or None), and the points (y * x, 2);  from_mm: the
-    indentation from which depths count
+    maps: sampling of the map's plane, of a free lower side (or None), and the points (y * x, 2);  from_mm: indentation at which
+    depths are zero
     """
     sampling, lower, grid = maps
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
@@ -154,7 +154,7 @@ def _read_load_step(body, maps, load_step, *, from_mm):
 
 
 def _pressure(top, slab):
-    """Samples of the contact pressure, a mean over each face of the sensing surface."""
+    """Samples of the contact pressure, the mean over each face of the sensing surface."""
     count = len(top.faces)
     places = top.reference.reshape(count, -1, 3).mean(axis=1) * [1.0, 1.0, 0.0]
     return Samples(places, top.area.reshape(count, -1).sum(axis=1), top.pressure_of_faces(slab))

@@ -1,6 +1,6 @@
 """Loading and pressing sensors of each kind: one entry of `KINDS` for each kind of `sensors.specification.KINDS`.
 
-A kind from outside of the package: a class of specification and a `Kind`, each added to its registry under the kind's name.
+To add a kind from outside the package, add a class of specification and a `Kind` to these registries under the kind's name.
 """
 
 from collections.abc import Callable, Mapping
@@ -60,14 +60,14 @@ class Kind:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(self.models)}.")
         named = [name for name in self.models if name != "auto"]
         raise InputError(f"model={model!r}: {sensor} is a sensor that {' or '.join(f'model={name!r}' for name in named)} presses; "
-                         "leave model out, or name that one.")
+                         "leave model out, or name this one.")
 
 
 # --- sensors of layers: `frusta` and `layers` ---
 
 
 def load_layers(spec: AnySpec, laws: dict[str, Law]) -> dict[str, Any]:
-    """Specification and laws of a sensor of layers; `laws`: {layer: Law}. A `calibration` scales the others of its file."""
+    """Specification and laws of a sensor of layers; `laws`: {layer: Law}. A `calibration` scales the laws of the file."""
     for layer in sorted(set(laws) - set(spec.materials)):
         raise InputError(f"{spec.name} has no layer {layer!r} for the material given; its layers are {', '.join(spec.materials)}.")
     stiffness = 1.0
@@ -87,7 +87,7 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
         raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
                          "rigid mesh.")
     if task.motion.forces_n is not None:
-        return _by_forces(sensor, task, choice.PRESSES[model], threads=task.course.threads if model == "elastic" else 1)
+        return _by_forces(sensor, task, choice.PRESSES[model], threads=task.control.threads if model == "elastic" else 1)
     motions = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
     if model not in motions:
         raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic, hyperelastic or "
@@ -95,7 +95,7 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
     if task.motion.turns or task.motion.loaded_aside:
         raise InputError(f"model={model!r}: the {model} model neither turns an object nor loads it aside; use model='solid' for "
                          "this motion.")
-    return _by_motion(sensor, task, motions[model], threads=task.course.threads if model == "elastic" else 1)
+    return _by_motion(sensor, task, motions[model], threads=task.control.threads if model == "elastic" else 1)
 
 
 def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
@@ -108,21 +108,21 @@ def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
 
 
 def _by_forces(sensor, task, press, *, threads=1):
-    """A press straight down by growing forces."""
+    """A press straight down by increasing forces."""
     forces = checked_forces(task.motion.forces_n, sensor.spec.force_range_n, sensor.spec.name)
     placed, finish = _placed(sensor, task)
-    task.course.reached.finish = lambda result: finish(choice.with_expected_error(sensor, result))
-    # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
+    task.control.reached.finish = lambda result: finish(choice.with_expected_error(sensor, result))
+    # With more threads, dense products of some hundred rows wait for each other and take up to five times as long.
     with threadpool_limits(limits=threads):
-        return task.course.reached.finish(press(sensor, placed, forces, task.course))
+        return task.control.reached.finish(press(sensor, placed, forces, task.control))
 
 
 def _by_motion(sensor, task, press, *, threads=1):
-    """A press along a motion other than straight down by growing forces."""
+    """A press along a motion other than straight down by increasing forces."""
     placed, finish = _placed(sensor, task)
-    task.course.reached.finish = lambda result: finish(flag_overloaded(result, sensor.spec.force_range_n[1]))
+    task.control.reached.finish = lambda result: finish(flag_overloaded(result, sensor.spec.force_range_n[1]))
     with threadpool_limits(limits=threads):
-        return task.course.reached.finish(press(sensor, placed, task.motion, task.course))
+        return task.control.reached.finish(press(sensor, placed, task.motion, task.control))
 
 
 def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callable[[PressResult], PressResult]]:
@@ -133,7 +133,7 @@ def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callabl
 
     def finish(result: PressResult) -> PressResult:
         result = flag_buried(result, float(placed.bounds[1, 2]) - touch)
-        if not task.course.keep_object:
+        if not task.control.keep_object:
             return result
         return replace(result, placed_object=placed_object(placed, touch_mm=touch, indentation_mm=result.indentation_mm,
                                                            aside_mm=task.motion.aside_mm))

@@ -1,4 +1,4 @@
-"""Maps of one object at rising forces, for interpolation to any force between them."""
+"""Maps of one object at rising forces, to interpolate at any force."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
     from softtact.sensors.specification import AnySpec
 
-_HARDLY = 1e-6     # of a force: largest share on the shell without a warning
-_DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not stiffen towards its base
-_HARDLY_COMPRESSED = 0.33   # of a frustum's height: the foundation model's error is at most 2 % (docs/explanation/fast_models.md)
+_NEGLIGIBLE = 1e-6     # of a force: largest share on the shell without a warning
+_DEEPEST_LINEAR = 0.5       # of the layer's thickness, beyond which a real layer is stiffer than a linear one
+_SLIGHT_COMPRESSION = 0.33   # of a frustum's height: the foundation model's error is at most 2 % (docs/explanation/fast_models.md)
 _OVERLAP_LEFT = 3.0         # times the allowed overlap, or gap under pressure: above, the augmentations have failed
 _FEWEST_POINTS = 9          # contact points under pressure: fewer do not resolve the contact of a spike
 
@@ -37,7 +37,7 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
                 **numbers: Any) -> PressResult:
     """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
 
-    lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
+    lower_maps among these: maps of a lower side that moves; capacitance follows from the change of thickness
     pressure among these: `Samples` of the contact pressure at each load step, where the model gives it
     """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
@@ -67,7 +67,7 @@ def layered_surface(spec: "AnySpec", thinning_mm: np.ndarray, displacement_mm: n
 
 
 def _of_one_face(samples: Callable[[], Any]) -> Callable[[str | None], Any]:
-    """Samples of a surface that has no other face."""
+    """Samples by the name of a face, for a surface without named faces."""
     def of(face: str | None) -> Any:
         if face is not None:
             raise InputError(f"there is no face {face!r}: a sensor of layers has its sensing surface alone; leave 'face' out.")
@@ -77,7 +77,7 @@ def _of_one_face(samples: Callable[[], Any]) -> Callable[[str | None], Any]:
 
 
 def _on_map(spec: "AnySpec", fields: np.ndarray) -> list[Samples]:
-    """Samples of fields (l, ny, nx, 3) at the points of the map, each of its share of the area."""
+    """Samples of fields (l, ny, nx, 3) at the points of the map, each with its share of the area."""
     x, y = np.meshgrid(spec.map_x_mm, spec.map_y_mm)
     sides = [np.convolve(np.pad(np.diff(line), 1), [0.5, 0.5], mode="valid") for line in (spec.map_y_mm, spec.map_x_mm)]
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
@@ -91,11 +91,11 @@ def _calibration(spec):
 
 def warn_of_shell(spec: "AnySpec", forces: np.ndarray, on_pad: np.ndarray) -> None:
     """Warn of the first load step at which the shell carries a part of the forces (l,) in N, the pad the rest."""
-    resting = np.flatnonzero(forces - on_pad > _HARDLY * forces)
+    resting = np.flatnonzero(forces - on_pad > _NEGLIGIBLE * forces)
     if len(resting):
         first = resting[0]
-        warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which feels {on_pad[first]:.3g} N of "
-                      f"it (`result.pad_force_n`; {spec.edge.in_words}): if your sensor's shell ends lower, say so by 'edge' in "
+        warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which carries {on_pad[first]:.3g} N "
+                      f"of it (`result.pad_force_n`; {spec.edge.in_words}); if your sensor's shell ends lower, state 'edge' in "
                       "its file.", ShellWarning, stacklevel=5)
 
 
@@ -119,16 +119,16 @@ def valid_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustu
     """Which load steps (l,) of a foundation press are valid, by the most compressed frustum (l,), frustum_mm high, and by the
     descent (l,) of the object's lowest point, as the slab is linear too and does not limit the depth of a corner.
     """
-    return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
+    return (compression_mm < min(law_limit_mm, _SLIGHT_COMPRESSION * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
 def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarray, points: np.ndarray, depth_mm: np.ndarray,
                        rough: np.ndarray, forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> np.ndarray:
     """Which load steps (l,) of a hyperelastic press are valid, by compression, contact error, residual and growth of depth.
 
-    contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
-    points (l,): of the cover that carry the object;  compression_mm, frustum_mm: nan without frusta, where nothing asks for them
-    rough (l,): whether more than the tolerance is left unbalanced;  forces_n (l,): where they do not grow, depths need not either
+    contact_error_mm (l,): deepest overlap, or widest gap under pressure; `allowed_mm` is the tolerance for it
+    points (l,): number of the cover's points that carry the object;  compression_mm, frustum_mm: nan without frusta
+    rough (l,): whether the residual is above the tolerance;  forces_n (l,): depths must grow where these do
     """
     return (~rough & ~(compression_mm >= FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
             & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))

@@ -48,7 +48,7 @@ class Batch:
     failures: str = "raise"
     """`raise` or `keep`."""
     label: str = "presses"
-    """What the progress begins with."""
+    """First words of the progress."""
     options: dict[str, Any] = field(default_factory=dict)
     """`policy` and `tolerance_mm`."""
 
@@ -70,7 +70,7 @@ def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh | SoftObject, 
 
 def _pressed_all(sensor, jobs, batch):
     model, device = batch.model, batch.device
-    if jobs and on_gpu(device, model) and sensor.spec.base_held:     # the batch does not know how a free lower side moves
+    if jobs and on_gpu(device, model) and sensor.spec.base_held:     # the batch has no motion of a free lower side
         return press_batch(sensor, jobs, batch.force_n, device="cuda" if device == "auto" else device, workers=batch.workers,
                            label=batch.label)
     prepared = _PREPARED.get(model, ())
@@ -93,9 +93,9 @@ def on_gpu(device: str, model: str) -> bool:
 
 def press_batch(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh, Pose | None]], force_n: np.ndarray, *, device: str,
                 workers: int, label: str) -> list[Any]:
-    """Presses of the elastic model, all of them columns of one problem on a torch device; an error in the place of one that fails.
+    """Presses of the elastic model as columns of one problem on a torch device; an error in the place of a press that fails.
 
-    jobs: (mesh, pose) of each. Their undersides are found by processes.
+    jobs: (mesh, pose) of each. Processes find their undersides.
     """
     from softtact.models.elastic.batch import press_layers
 
@@ -141,7 +141,7 @@ def _underside(sensor, job):
 
 
 def _read(sensor, press, underside, force_n, job):
-    if press.contact.depth[-1] > underside.stop_mm:     # rare: one that rests on the shell is pressed by itself
+    if press.contact.depth[-1] > underside.stop_mm:     # rare: an object on the shell is pressed alone
         return _pressed(sensor, job, force_n=force_n, model="elastic", options={})
     settled = press.contact.settled
     if not settled.all():
@@ -151,19 +151,19 @@ def _read(sensor, press, underside, force_n, job):
 
 
 def _each(sensor, act, jobs, workers):
-    """act(sensor, job) of each job, in their order, over processes."""
+    """act(sensor, job) of each job, in their order, in processes."""
     workers = min(workers, len(jobs))
     if workers <= 1:
         yield from (act(sensor, job) for job in jobs)
         return
-    # A forked process shares the prepared arrays; where there is no fork each gets its copy.
+    # A forked process shares the prepared arrays; without fork each process gets a copy.
     context = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(sensor,)) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_store_sensor, initargs=(sensor,)) as pool:
         yield from pool.map(_in_process, repeat(act), jobs, chunksize=max(1, len(jobs) // (8 * workers)))
 
 
-def _begin(sensor):
-    global _sensor     # one for each process, which presses with nothing else
+def _store_sensor(sensor):
+    global _sensor     # the one sensor of a process
     _sensor = sensor
 
 
@@ -177,7 +177,7 @@ def _pressed(sensor, job, *, force_n, model, options):
     try:
         return sensor.press(mesh, pose=pose, force_n=force_n, model=model, threads=1, label="", **options)
     except (ConvergenceError, InputError) as error:
-        return error.with_traceback(None)     # its frames hold the press' matrices
+        return error.with_traceback(None)     # the traceback holds the press' matrices
 
 
 def raise_first(results: list[Any]) -> list[PressResult]:

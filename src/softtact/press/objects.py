@@ -13,10 +13,11 @@ from softtact.contact.motion import FREEDOMS, Motion
 from softtact.contact.shell import Shell
 from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
+from softtact.geometry.meshes import misses_sensor
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 
-OBJECT = "object"  # the frame that moves what is pressed
+OBJECT = "object"  # the frame of the pressed object
 _MIRROR = np.diag([1.0, 1.0, -1.0])
 _VARIABLES = {"object_points_mm": ("points_mm", ("object_point", "axis"), "mm"),
               "object_triangles": ("triangles", ("object_triangle", "corner"), "1"),
@@ -60,28 +61,19 @@ class SoftObject:
         points = points - [middle[0], middle[1], 0.0] if pose is None else pose.apply(points)
         over = (np.abs(points[:, :2]) <= 0.5 * np.asarray(shell.footprint_mm)).all(axis=1)
         if not over.any():
-            raise InputError(_missing(points, shell.footprint_mm))
+            raise misses_sensor(points, shell.footprint_mm, name="The soft object")
         lift = height_mm - points[over, 2].min()
         if (beside := shell.beneath(points)).any():
             lift = max(lift, height_mm - shell.below_mm - points[beside, 2].min())
         return self.with_faces(points + [0.0, 0.0, lift], np.array([0.0, 0.0, -1.0]))
 
     def with_faces(self, points: np.ndarray, direction: np.ndarray) -> SolidMesh:
-        """The body with its nodes at points (n, 3), and faces `held`, its rear as seen along a unit vector (3,), and `pressed`."""
+        """The body with its nodes at points (n, 3) and two faces: `held`, its rear along a unit vector (3,), and `pressed`."""
         along = points @ direction
         end = along.min() + self.held_share * np.ptp(along)
         return self.mesh.moved(lambda _: points).with_faces(
             held=lambda x: x @ direction < end, pressed=lambda x: x @ direction >= end
         )
-
-
-def _missing(points: np.ndarray, footprint_mm: tuple[float, float]) -> str:
-    """The message for an object of which no node is over the sensor."""
-    (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
-    return (
-        f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and none of its "
-        f"nodes is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose."
-    )
 
 
 @dataclass(frozen=True)
@@ -143,22 +135,22 @@ def first_direction(motion: Motion) -> np.ndarray:
     return np.array([0.0, 0.0, -1.0])
 
 
-def way_to_touch(coming: np.ndarray, surface: np.ndarray, direction: np.ndarray) -> float:
+def distance_to_touch(approaching: np.ndarray, surface: np.ndarray, direction: np.ndarray) -> float:
     """Displacement (mm) along a unit vector (3,) until triangles (t, 3, 3) first touch those of a surface (u, 3, 3), all in mm.
 
-    Facets are counter-clockwise from outside. It is negative if they overlap already, and inf if they miss each other.
+    Facets are counter-clockwise from outside. It is negative where they overlap already, and inf where they miss each other.
     """
     turned = _turn_down(direction)
-    coming, surface = coming @ turned.T, surface @ turned.T
-    from_above = _gap(coming, surface)
-    from_below = _gap(surface[:, ::-1] @ _MIRROR, coming[:, ::-1] @ _MIRROR)     # turned upside down, the surface comes down
+    approaching, surface = approaching @ turned.T, surface @ turned.T
+    from_above = _gap(approaching, surface)
+    from_below = _gap(surface[:, ::-1] @ _MIRROR, approaching[:, ::-1] @ _MIRROR)     # upside down, the surface approaches
     return min(from_above, from_below)
 
 
-def _gap(coming, surface):
+def _gap(above, surface):
     """Least height (mm) of the underside of triangles over the corners of others."""
-    base = np.array([0.0, 0.0, coming[..., 2].min()])
-    field = HeightField(trimesh.Trimesh(*_corners(coming - base), process=False))
+    base = np.array([0.0, 0.0, above[..., 2].min()])
+    field = HeightField(trimesh.Trimesh(*_corners(above - base), process=False))
     points = np.unique((surface - base).reshape(-1, 3), axis=0)
     height, _ = field(points[:, 0], points[:, 1])
     return float(np.min((height - points[:, 2])[height < NO_CONTACT_MM], initial=np.inf))

@@ -1,4 +1,4 @@
-"""A picture of one press: of each load step the deformation map, taxels, other readings, solids from a side, as it has them."""
+"""A picture of one press: at each load step deformation map, taxels, other readings and solids from the side, where present."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,9 +19,9 @@ _HEIGHT = 2.6            # inches of a row that is no map
 
 def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | None" = None) -> "Figure":
     """A column per load step, a row for each thing: the map in mm, the counts of the taxels with numbers in the cells, each other
-    reading, and of solids the nodes of their outside as they moved.
+    reading, and for solids the displaced nodes of their outside.
 
-    full_scale: let the taxels' colours end at the readout's largest count; else at the largest one that is there
+    full_scale: the taxels' colours end at the readout's largest count; else at the largest count of the press
     figure: to draw into, by default a new one that no window shows
     """
     from matplotlib.figure import Figure
@@ -46,7 +46,7 @@ def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | N
 
 
 def _rows(result, full_scale):
-    """What draws each row, its name, what its colours mean, and what it takes beside result, axis and step."""
+    """For each row: its drawing function, its name, the meaning of its colours, and further arguments of the function."""
     if result.deformation_map_mm is not None:
         yield _draw_map, "deformation: y (mm)", "towards the PCB (mm)"
     taxels = result.readings.get("taxels")

@@ -31,7 +31,7 @@ class Reached:
         """Iterate over `count` load steps and record the time of each; the solver's preparation counts to the first.
 
         so_far: makes the result of the steps whose times are recorded: an interruption may come just before that
-        label: of the progress on stderr;  start: of the preparation, by `time.perf_counter`
+        label: of the progress on stderr;  start: time at which the preparation began, by `time.perf_counter`
         """
         self.times.clear()
         self._so_far = so_far
@@ -41,7 +41,7 @@ class Reached:
             self.times.append(now - last)
             last = now
             if self.on_step and len(self.times) < count:
-                with warnings.catch_warnings():     # they are left to the last result
+                with warnings.catch_warnings():     # the last result gives them
                     warnings.simplefilter("ignore")
                     self.on_step(self.finish(so_far()))
 

@@ -1,7 +1,6 @@
-"""What a press gives, whatever the sensor and the model: numbers per load step, maps of the surface, fields of the bodies,
-readings.
+"""The result of a press, for all sensors and models: numbers per load step, maps of the surface, fields of the bodies, readings.
 
-`PressResult.write` keeps it as NetCDF, `read_press` reads it back; `write_vtu` is for ParaView, `plot` draws what there is.
+`PressResult.write` stores it as NetCDF, `read_press` reads it back; `write_vtu` is for ParaView, `plot` draws it.
 Files hold arrays by the names of the fields of `PressResult`, with their units. `tactile_map` is the reading `taxels`; any other is
 called `reading_NAME`, and its dimensions and coordinates end in `_of_NAME`. The mesh of solids is `node_mm`, `cells_K` and
 `facets_K`; their nodes' displacement is `node_displacement_mm`, other fields of `SolidFields` have its names.
@@ -30,23 +29,23 @@ if TYPE_CHECKING:
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
 
 
-_ABSENT: Any = None      # of what a sensor or a model does not have
-_PLANE = {"plane": True}     # of sensors with a plane of maps
+_ABSENT: Any = None      # a field that a sensor or a model does not have
+_PLANE = {"plane": True}     # a field of sensors with a plane of maps
 
 
 def _array(units: str, *dimensions: str, coordinate: str | None = None) -> dict[str, Any]:
-    """How a field of a result stands in a file: as an array with units ("1": a number), or as the coordinate of that name."""
+    """Metadata of a field that files hold as an array with units ("1": a number), or as the coordinate of that name."""
     return {"units": units, "dimensions": dimensions, "coordinate": coordinate}
 
 
-_FACT = {"fact": True}      # a field that stands in a file as an attribute
+_FACT = {"fact": True}      # a field that files hold as an attribute
 
 
 @dataclass(frozen=True, kw_only=True)
 class PressResult:
     """One press, load step by load step. A field is one line here: its metadata say how it is written and read back.
 
-    Maps are None where the sensor has no plane of them; `solid` where the press had no solids, or was not asked to keep them. The
+    Maps are None where the sensor has no plane of maps; `solid` is None where the press had no solids or did not keep them. The
     fields of `solid` are attributes of the result, too: `result.volume_ratio`.
     """
 
@@ -89,34 +88,34 @@ class PressResult:
     solver: str = field(metadata=_FACT)
     """The linear solver's name."""
     pad_force_n: np.ndarray = field(default=_ABSENT, metadata=_array("N", "step"))
-    """(step,) in N: what of `normal_force_n` the pad carries."""
+    """(step,) in N: the part of `normal_force_n` that the pad carries."""
     shell_force_n: np.ndarray = field(default=_ABSENT, metadata=_array("N", "step"))
-    """(step,) in N: what the rigid shell around the pad carries, where an object wider than the pad rests on it; else 0."""
+    """(step,) in N: the part that the rigid shell around the pad carries, under an object wider than the pad; else 0."""
     force_n: np.ndarray = field(default=_ABSENT, metadata=_array("N", "step", "axis"))
     """(step, 3) in N: the object's force on the sensor, pad and shell, along x, y, z; z is negative where it presses."""
     torque_nmm: np.ndarray = field(default=_ABSENT, metadata=_array("N mm", "step", "axis"))
     """(step, 3) in N mm: the torque of that force about the origin of the sensor frame; nan where the model does not
-    give it, and where the shell carries a part, whose place is not known."""
+    give it, and where the shell carries a part, as the position of that force is not known."""
     displacement_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x", "axis") | _PLANE)
     """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model gives the map alone.
     Of a sensor without a plane `solid.displacement_mm` (step, node, 3)."""
     slip: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
-    """(step, y, x) in mm: how far the surface slid along the object since it came to touch; nan where it does not touch, and where
-    the model knows no friction."""
+    """(step, y, x) in mm: how far the surface slid along the object since first contact; nan where it does not touch, and where
+    the model has no friction."""
     expected_error_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step"))
-    """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, of a fast model on frusta and
-    where the model was chosen by it; else nan. How well it is known: docs/explanation/fast_models.md."""
+    """(step,) in mm: expected error against the hyperelastic model, root mean square over the map, for a fast model on frusta and
+    where the model was chosen by it; else nan. Its accuracy: docs/explanation/fast_models.md."""
     selection_reason: str = field(default="", metadata=_FACT)
     """The reason for the choice of the model, if the user did not name it."""
     largest_counts: float = field(default=2400.0, metadata=_FACT)
-    """Counts at which the sensor's readout ends."""
+    """Largest counts of the sensor's readout."""
     attributes: dict[str, Any] = field(default_factory=dict)
     """More facts (numbers and texts): thickness_mm, friction, repairs of the mesh. They are written as attributes, too."""
     bodies: "tuple[PressedBody, ...]" = ()
     """A `PressedBody` of the layers for each step where `Sensor.press` was asked to keep them, else none; not written with the
     maps."""
     solid: SolidFields | None = None
-    """What the solids of a press by the solid model did: mesh, nodal displacement, stress and contact pressure, loads of frames."""
+    """Fields of the solids, of a press by the solid model: mesh, nodal displacement, stress, contact pressure, loads of frames."""
     placed_object: PlacedObject | None = None
     """The object where it is at each load step, where `Sensor.press` was asked to keep it; it is written with the maps."""
 
@@ -138,7 +137,7 @@ class PressResult:
 
     def __getattr__(self, name: str) -> Any:
         solid = self.__dict__.get("solid")
-        if name in _OF_POINTS and "readings" in self.__dict__:     # short names of version 0.1
+        if name in _OF_POINTS and "readings" in self.__dict__:     # names of version 0.1
             return _OF_POINTS[name](self)
         if solid is None or name.startswith("_") or not hasattr(solid, name):
             raise AttributeError(f"this {type(self).__name__} has no {name!r}")
@@ -179,7 +178,7 @@ class PressResult:
     def plot(self, path: str | Path | None = None, *, full_scale: bool = False) -> "Figure":
         """A matplotlib figure of maps and taxels at each load step; written to `path` (PNG or SVG) where one is given.
 
-        full_scale: let the taxels' colours end at the readout's largest count; else at the largest one that is there
+        full_scale: the taxels' colours end at the readout's largest count; else at the largest count of the press
         """
         from softtact.press import plot
 
@@ -204,7 +203,7 @@ class PressResult:
     def write(self, path: str | Path, *, settings: dict[str, Any] | None = None, seed: int | None = None) -> None:
         """Write as NetCDF (.nc); `read_press` reads it back.
 
-        settings, seed: what the press came from, for the file's record of its provenance
+        settings, seed: of the press, for the file's record of its provenance
         """
         if Path(path).suffix.lower() != ".nc":
             raise InputError(f"{path}: a result is written as .nc; give a name with such an ending.")
@@ -217,7 +216,7 @@ class PressResult:
         vtu.write(self, path)
 
 
-# Names that results on sensors of kind solid had: of the readout `points`.
+# Names of version 0.1 for the readout `points`, on sensors of kind solid.
 _OF_POINTS: dict[str, Callable[[PressResult], np.ndarray]] = {
     "reading_points_mm": lambda result: np.zeros((0, 3)) if "points" not in result.readings else np.column_stack(
         [result.readings["points"][f"{axis}_mm"].values for axis in "xyz"]),
@@ -233,17 +232,17 @@ _OLD_KIND = "softtact solid result"     # of files of solids of version 0.1
 
 
 def _arrays(of: type = PressResult) -> list[Field[Any]]:
-    """The fields of a result, or of `SolidFields`, that stand as arrays in a file."""
+    """The fields of a result, or of `SolidFields`, that files hold as arrays."""
     return [one for one in fields(of) if "dimensions" in one.metadata]
 
 
 def _facts() -> list[str]:
-    """Names of the fields that stand as attributes in a file."""
+    """Names of the fields that files hold as attributes."""
     return [one.name for one in fields(PressResult) if "fact" in one.metadata]
 
 
 def _name(one: Field[Any]) -> str:
-    """What an array is called in a file."""
+    """Name of an array in a file."""
     return one.metadata["coordinate"] or one.name
 
 
@@ -281,13 +280,13 @@ def _is_tactile_map(result):
 
 
 def _with_separate_dimensions(name, reading):
-    """A reading whose dimensions, but for `step`, and coordinates have names that no other has."""
+    """A reading with unique names of its coordinates and of its dimensions except `step`."""
     names = {one: f"{one}_of_{name}" for one in (*reading.dims, *reading.coords) if one != "step"}
     return reading.rename(names).assign_attrs(reading=name)
 
 
 def _of_solid(solid):
-    """Variables of what solids did."""
+    """Variables of the fields of solids."""
     variables: dict[str, Any] = {
         _IN_FILE.get(one.name, one.name): (one.metadata["dimensions"], getattr(solid, one.name), {"units": one.metadata["units"]})
         for one in _arrays(SolidFields)}
@@ -356,7 +355,7 @@ def _solid_of(data, geometry, thickness):
 
 
 def _renewed(path, data):
-    """The data set of an old file of solids, with the names and numbers that results have now; what it does not hold is nan."""
+    """The data set of an old file of solids with the names and numbers of today's results; missing numbers are nan."""
     missing = [one.name for one in _arrays(SolidFields) if one.name not in data.variables]
     if missing:
         raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); press again.")

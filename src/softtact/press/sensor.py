@@ -41,7 +41,7 @@ def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None
 
     name_or_yaml: config/sensors/NAME.yaml of the working folder comes first, then what ships with the package: coro (its product's
     name, tsf85, means the same sensor), pad, and without frusta sheet and pad4x4; materials that a
-    sensor names are found in the same way
+    sensor names are found likewise
     materials: {layer or region: Law}, in place of those of the file: of layers dielectric and cover
     device: where elements are summed up, see `Sensor`
     A `calibration` in the file (see `softtact calibrate`) scales the moduli of the elastic layer and of the laws that are not
@@ -70,19 +70,19 @@ class Sensor:
     """A sensor of any kind, with a law for each layer or region."""
 
     spec: Any
-    """What its file states: a `SensorSpec`, `LayersSpec` or `SolidSpec`."""
+    """Contents of its file: a `SensorSpec`, `LayersSpec` or `SolidSpec`."""
     laws: dict[str, Law]
     """By layer or region."""
     mesh: MeshSettings = MeshSettings()
     """Resolution of the hyperelastic model's body."""
     solver: newton.NewtonSettings = newton.NewtonSettings()
-    """What counts as solved by that model."""
+    """Tolerances of that model."""
     prepared_models: dict[str, Any] = field(default_factory=dict)
-    """{"elastic": Compliance, "foundation": FoundationCompliance}, what the fast models start from; else the user's cache."""
+    """{"elastic": Compliance, "foundation": FoundationCompliance}, prepared data of the fast models; else from the user's cache."""
     scatter: tuple | None = None
-    """Of the frusta's heights and diameters, one by one."""
+    """Scatter of the heights and diameters of single frusta."""
     attributes: dict[str, Any] = field(default_factory=dict)
-    """Facts that each result of it holds."""
+    """Facts that each of its results holds."""
     device: str = "cpu"
     """Where the hyperelastic model, and the solid model on a sensor of kind solid, sum up their elements: `cpu`, `cuda`, or `auto`:
     a GPU where torch finds one; the solid model also takes `warp`."""
@@ -91,7 +91,7 @@ class Sensor:
 
     @property
     def readouts(self) -> dict[str, Readout]:
-        """What it tells of a press, by name."""
+        """Its readouts by name."""
         return {name: make_readout(name, entry, where=self.spec.name) for name, entry in self.spec.stated_readouts.items()}
 
     def press(self, mesh: "trimesh.Trimesh | SoftObject | str | Path", *, unit: str | None = None,
@@ -114,7 +114,7 @@ class Sensor:
         """
         press = KINDS[self.spec.kind].press(model, self.spec.name)
         task = task_of(self.spec, mesh, unit, pose, motion_of(self.spec, force_n, motion), options)
-        with task.course.reached.kept():
+        with task.control.reached.kept():
             return press(self, task)
 
     def press_many(self, meshes: trimesh.Trimesh | SoftObject | Sequence[trimesh.Trimesh | SoftObject],
@@ -134,7 +134,7 @@ class Sensor:
         return press_many(self, list(zip(meshes, places, strict=True)), Batch.of(self.checked_forces(force_n), model, options))
 
     def prepared(self, model: str, threads: int = 1) -> Any:
-        """What a fast model starts from: `Compliance` or `FoundationCompliance`, computed on first use."""
+        """Prepared data of a fast model: `Compliance` or `FoundationCompliance`, computed on first use."""
         self.spec.check_for(model)
         if model not in self.prepared_models:
             self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"

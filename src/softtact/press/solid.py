@@ -1,7 +1,7 @@
 """Presses by the solid model: sensor and object as solids of finite strain that meet surface to surface.
 
-Of a sensor of kind solid, its mesh is pressed from any side. Of a sensor of layers, these are meshed as a solid and its frusta are
-springs (`press.solid_pad`). The object is rigid, or a `SoftObject` whose rear a rigid holder carries.
+A sensor of kind solid is pressed from any side. The layers of a sensor of layers are meshed as a solid, and its frusta are springs
+(`press.solid_pad`). The object is rigid, or a `SoftObject` whose rear a rigid holder carries.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,11 +28,11 @@ from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.result import gathered
 from softtact.press.making import flag_buried, flag_overloaded, layered_surface
-from softtact.press.objects import OBJECT, PlacedObject, SoftObject, first_direction, way_to_touch
+from softtact.press.objects import OBJECT, PlacedObject, SoftObject, distance_to_touch, first_direction
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult
 from softtact.press.solid_pad import SolidPad
-from softtact.press.task import Course, PressTask
+from softtact.press.task import PressTask, RunControl
 from softtact.progress import Watch, announce
 from softtact.readout.registry import Samples, SurfaceMotion, readings_of
 from softtact.sensors.solid import SolidSpec
@@ -41,15 +41,15 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 _PENALTY = 20.0       # times E / h of the softer surface
-_REACH = 2.0          # times the length of a facet: how far apart surfaces may be that meet
+_REACH = 2.0          # times the length of a facet: the largest gap that the contact search covers
 
 
 # --- sensors of layers ---
 
 
 _SMOOTH = SolidSettings()
-# Points of a rubber that rest on an edge between two facets of a rigid mesh change from one to the other in turns, which leaves up
-# to 1e-5 of the load unbalanced (a ball on coro, 0.5 mm deep), far below what the mesh leaves.
+# Contact points at an edge between two facets of a rigid mesh alternate between these, which leaves up to 1e-5 of the load
+# unbalanced (a ball on coro, 0.5 mm deep), far below the error of the mesh.
 _ON_FACETS = SolidSettings(relative_residual=2e-5)
 
 
@@ -58,33 +58,33 @@ def press_pad(sensor: "Sensor", task: PressTask) -> PressResult:
 
     Raises InputError where the object misses the sensor, ConvergenceError where a step is not reached.
     """
-    course = task.course
+    control = task.control
     pad = SolidPad(sensor)
     if isinstance(task.pressed, SoftObject):
         placed = task.pressed.placed(task.pose, pad.height_mm, pad.shell)
-        body = pad.with_object(placed, task.pressed, threads=course.threads)
+        body = pad.with_object(placed, task.pressed, threads=control.threads)
     else:
         rigid = place(task.pressed, pose=task.pose)
         check_over_sensor(rigid, sensor.spec.footprint_mm)
-        body = pad.with_rigid(rigid, threads=course.threads)
-        course.reached.finish = partial(_finished, sensor, rigid, task)
-    gather = partial(_on_pad, pad, body, None if task.soft or not course.keep_object else rigid, course)
-    return course.reached.finish(run(body, OBJECT, task.motion, gather, course, _SMOOTH if task.soft else _ON_FACETS))
+        body = pad.with_rigid(rigid, threads=control.threads)
+        control.reached.finish = partial(_finished, sensor, rigid, task)
+    gather = partial(_on_pad, pad, body, None if task.soft or not control.keep_object else rigid, control)
+    return control.reached.finish(run(body, OBJECT, task.motion, gather, control, _SMOOTH if task.soft else _ON_FACETS))
 
 
 def _finished(sensor, rigid, task, result):
-    """A result with flags: of steps that bury a rigid object, or that overload the sensor."""
+    """A result with flags at steps that bury a rigid object or overload the sensor."""
     touch = HeightField(rigid).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     return flag_overloaded(flag_buried(result, float(rigid.bounds[1, 2]) - touch), sensor.spec.force_range_n[1])
 
 
-def _on_pad(pad, body, rigid, course, steps):
+def _on_pad(pad, body, rigid, control, steps):
     """The result of load steps, in the sensor's frame, with solids and a rigid object where they are kept."""
     down = np.array([0.0, 0.0, pad.height_mm])
-    result = pad.result(body, steps, keep_body=course.keep_body)
-    if pad.sensor.spec.readouts:      # taxels alone, the default, need no pressure
+    result = pad.result(body, steps, keep_body=control.keep_body)
+    if pad.sensor.spec.readouts:      # the default, taxels, needs no pressure
         result = replace(result, readings=_readings_on_pad(pad, body, result, steps))
-    if course.keep_body:
+    if control.keep_body:
         solid = gathered(body, steps)
         result = replace(result, solid=replace(solid, mesh=solid.mesh.moved(lambda x: x - down),
                                                object_points_mm=solid.object_points_mm - down))
@@ -99,7 +99,7 @@ def _on_pad(pad, body, rigid, course, steps):
 
 
 def _readings_on_pad(pad, body, result, steps):
-    """What readouts read where the contact pressure is known."""
+    """The readings, with the contact pressure."""
     down = np.array([0.0, 0.0, pad.height_mm])
     contacts = [(step.state.histories[0].points, step.state.contacts[0]) for step in steps]
     pressure = [Samples(places(points, body.points) - down, points.weight, state.pressure) for points, state in contacts]
@@ -113,7 +113,7 @@ def _readings_on_pad(pad, body, result, steps):
 def load_solid(spec: SolidSpec, laws: dict[str, Law]) -> tuple[SolidMesh, dict[str, Law]]:
     """The mesh and the laws by region of a sensor of kind solid; `laws`: {region: Law} in place of those of its file.
 
-    Raises InputError: a mesh that is not there or not spatial, a region without a law, a face that does not exist or would be
+    Raises InputError for a mesh that does not exist or is not spatial, a region without a law, a face that does not exist or is
     empty.
     """
     mesh = with_named_faces(read_mesh_file(spec.mesh_path, unit=spec.mesh.unit), spec.faces)
@@ -133,36 +133,36 @@ def load_solid(spec: SolidSpec, laws: dict[str, Law]) -> tuple[SolidMesh, dict[s
 def press_body(sensor: "Sensor", task: PressTask) -> PressResult:
     """Press a rigid or a soft object on a sensor of kind solid.
 
-    By default the middle of the object's bounding box is at that of the contact's face. Along the first step of the motion it is
-    moved to where it first touches, from where displacements count. It turns about the middle of its bounding box.
+    By default the middle of the object's bounding box is at that of the contact's face. The object is moved along the first step of
+    the motion to first touch, from where displacements count. It turns about the middle of its bounding box.
     Raises InputError where it misses the contact's face, ConvergenceError where a step is not reached.
     """
-    body = body_of(sensor, task.pressed, task.pose, task.motion, threads=task.course.threads)
-    return run(body, OBJECT, task.motion, partial(_on_body, sensor, body), task.course)
+    body = body_of(sensor, task.pressed, task.pose, task.motion, threads=task.control.threads)
+    return run(body, OBJECT, task.motion, partial(_on_body, sensor, body), task.control)
 
 
 def body_of(sensor: "Sensor", pressed: "trimesh.Trimesh | SoftObject", pose: Any, motion: Motion, *, threads: int = 1) -> SolidBody:
-    """A sensor of kind solid and the object (mm) where it first touches, as a `SolidBody` with the frame `object` and one pair."""
+    """A sensor of kind solid and the object (mm) at first touch, as a `SolidBody` with the frame `object` and one pair."""
     pose, direction = Pose.of(pose), first_direction(motion)
-    how: dict[str, Any] = {"held": sensor.spec.held, "threads": threads, "device": sensor.device}
+    settings: dict[str, Any] = {"held": sensor.spec.held, "threads": threads, "device": sensor.device}
     if isinstance(pressed, SoftObject):
         points = _placed(sensor, pressed.mesh.points, pose)
         points = points + _to_touch(sensor, fine_triangles(pressed.mesh.boundary, points), direction)
         placed = pressed.with_faces(points, direction)
         mesh = sensor.elements.joined(placed, prefix="object ")      # type: ignore[union-attr]
-        body = SolidBody(mesh, sensor.laws | {f"object {placed.regions[0]}": pressed.law}, **how,
+        body = SolidBody(mesh, sensor.laws | {f"object {placed.regions[0]}": pressed.law}, **settings,
                          carried={OBJECT: (_middle(points), ["object held"], "xyz")})
         body.add(_pair(sensor, body, Surface.of(mesh.face("object pressed")), soft=pressed))
         return body
     triangles = _placed(sensor, np.asarray(pressed.vertices), pose)[pressed.faces]
     triangles = triangles + _to_touch(sensor, triangles, direction)
-    body = SolidBody(sensor.elements, sensor.laws, **how, rigid={OBJECT: (_middle(triangles.reshape(-1, 3)), triangles)})  # type: ignore[arg-type, dict-item]
+    body = SolidBody(sensor.elements, sensor.laws, **settings, rigid={OBJECT: (_middle(triangles.reshape(-1, 3)), triangles)})  # type: ignore[arg-type, dict-item]
     body.add(_pair(sensor, body, Surface.of({"triangle": body.surface_nodes(OBJECT)})))
     return body
 
 
 def _middle(points: np.ndarray) -> np.ndarray:
-    """Of the bounding box of points (n, 3)."""
+    """Middle of the bounding box of points (n, 3)."""
     middle: np.ndarray = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return middle
 
@@ -176,9 +176,9 @@ def _placed(sensor: "Sensor", points: np.ndarray, pose: Pose | None) -> np.ndarr
 
 
 def _to_touch(sensor: "Sensor", triangles: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """The displacement (3,) in mm to where triangles (t, 3, 3) first touch the contact's face."""
+    """The displacement (3,) in mm after which triangles (t, 3, 3) first touch the contact's face."""
     spec, mesh = sensor.spec, sensor.elements
-    distance = way_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)  # type: ignore[union-attr]
+    distance = distance_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)  # type: ignore[union-attr]
     if not np.isfinite(distance):
         (x0, y0, z0), (x1, y1, z1) = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
         raise InputError(f"The object misses the face {spec.contact.face!r} of {spec.name}: it spans x {x0:.4g} to "
@@ -188,7 +188,7 @@ def _to_touch(sensor: "Sensor", triangles: np.ndarray, direction: np.ndarray) ->
 
 
 def _pair(sensor: "Sensor", body: SolidBody, other: Surface, *, soft: SoftObject | None = None) -> ContactPair:
-    """The contact's face against the object's surface; two soft surfaces are cut along each other."""
+    """The contact's face against the object's surface; with a soft object by segments of both surfaces."""
     spec = sensor.spec
     face = Surface.of(sensor.elements.face(spec.contact.face))      # type: ignore[union-attr]
     size = face.size_mm(body.points) if soft is None else other.size_mm(body.points)
@@ -207,7 +207,7 @@ def _on_body(sensor, body, steps):
 
 
 def surface_of(sensor: "Sensor", displacements: list[np.ndarray], contacts: list[tuple] | None = None) -> SurfaceMotion:
-    """What the surface of a sensor of kind solid did: displacements (n, 3) of the nodes, and (pair, history, state) of the contact.
+    """Motion of a solid sensor's surface, from displacements (n, 3) of the nodes and (pair, history, state) of the contact.
 
     contacts: none where nothing touches it
     """
@@ -249,23 +249,23 @@ def solid_result(path: SolidPath) -> PressResult:
 
 
 def run(body: SolidBody, frame: str, motion: Motion, gather: Callable[[list[SolidLoadStep]], PressResult],
-        course: Course, settings: SolidSettings = _SMOOTH) -> PressResult:
-    """What `gather` makes of the load steps of a body whose one frame is moved."""
-    def say(text: str) -> None:
-        if course.label:
-            announce(f"{course.label}: {text}")
+        control: RunControl, settings: SolidSettings = _SMOOTH) -> PressResult:
+    """The result that `gather` makes of the load steps of a body with one moving frame."""
+    def report(text: str) -> None:
+        if control.label:
+            announce(f"{control.label}: {text}")
 
-    count, steps, reached = len(motion.steps), list[SolidLoadStep](), course.reached
+    count, steps, reached = len(motion.steps), list[SolidLoadStep](), control.reached
 
     def announced() -> Iterator[None]:
-        for step in SolidPath(body, {frame: motion}, settings=settings, tell=say).run():
+        for step in SolidPath(body, {frame: motion}, settings=settings, tell=report).run():
             steps.append(step)
             force = float(np.linalg.norm(step.loads[0, :3]))
-            say(f"step {len(steps)} of {count}, {force:.4g} N, {step.iterations} iterations, {step.wall_time_s:.0f} s")
+            report(f"step {len(steps)} of {count}, {force:.4g} N, {step.iterations} iterations, {step.wall_time_s:.0f} s")
             yield
 
-    body.watch = Watch(course.label, limit_s=course.time_limit_s)
-    say(f"{len(body.free)} unknowns, {count} load steps of the solid model")
+    body.watch = Watch(control.label, limit_s=control.time_limit_s)
+    report(f"{len(body.free)} unknowns, {count} load steps of the solid model")
     try:
         reached.follow(announced(), count, lambda: gather(steps[:len(reached.times)]))
     finally:
@@ -283,7 +283,7 @@ def result_of_steps(body: SolidBody, steps: list[SolidLoadStep], *, sensor: str 
         return np.array([value(step) for step in steps])
 
     def torque(step):
-        point = frame.point + step.state.poses[0].translation     # about the origin of the frame of the mesh
+        point = frame.point + step.state.poses[0].translation     # torque about the origin of the mesh's frame
         return step.loads[0, 3:] + np.cross(point, step.loads[0, :3])
 
     force = fields.frame_load[:, 0, :3] if frame else np.zeros((len(steps), 3))

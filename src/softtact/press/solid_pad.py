@@ -1,6 +1,6 @@
-"""A sensor's layers as a solid of finite strain, its frusta as items below it, and what a press of it gives.
+"""A sensor's layers as a solid of finite strain with its frusta as items below it, and the result of a press on it.
 
-The object is soft, with elements that join the layers', or rigid: its exact facets on a frame with six freedoms.
+A soft object adds its elements to those of the layers; a rigid one is its exact facets on a frame with six freedoms.
 """
 
 from dataclasses import replace
@@ -12,10 +12,10 @@ import trimesh
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.errors import InputError
 from softtact.fem.elements import QUAD9
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.fem.structured_meshes import box
+from softtact.geometry.meshes import misses_sensor
 from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.models.hyperelastic.deformed_mesh import Cells, PressedBody
 from softtact.models.solid.body import SolidBody
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 _PENALTY = 20.0  # times E / h of the softer of both surfaces
 _CELL_OF_LAYERS = 20  # elements along the shorter side of a sensor without frusta
-_REGION = {"dielectric": "sheet", "cover": "cover"}  # what files of pressed bodies call the layers
+_REGION = {"dielectric": "sheet", "cover": "cover"}  # names of the layers in files of pressed bodies
 _SHELL = "shell"  # the frame that never moves
-_ACROSS = 8  # elements across what a rigid object may touch, at least ...
-_MOST_PARTS = 3  # ... but no more in place of one
-_NEAR = 0.4  # of the layers' height over its lowest point: what of a rigid object may touch
+_ACROSS = 8  # elements across the part that a rigid object may touch, at least ...
+_MOST_PARTS = 3  # ... but at most so many in place of one
+_NEAR = 0.4  # of the layers' height: a rigid object may touch with its part up to so far above its lowest point
 
 
 class SolidPad:
@@ -117,7 +117,7 @@ class SolidPad:
     def with_rigid(self, placed: trimesh.Trimesh, *, friction: float | None = None, threads: int) -> SolidBody:
         """The pad and a rigid object (mm, in its pose) that just touches pad or shell, as one `SolidBody`.
 
-        The pad's elements become smaller below what of the object may touch it.
+        The pad has smaller elements below the part of the object that may touch it.
         Frame `object`: about the middle of the object's bounding box, with six freedoms.
         friction: Coulomb's coefficient of object and surface, by default the sensor's
         Raises InputError where the object misses the sensor.
@@ -144,7 +144,7 @@ class SolidPad:
         return body
 
     def _part_below(self, triangles):
-        """Least and largest x and y (2, 2) of what may touch an object's triangles (t, 3, 3)."""
+        """Least and largest x and y (2, 2) of the part of the pad that may touch an object's triangles (t, 3, 3)."""
         below = _points_below(triangles, self.height_mm * (1 + _NEAR))[:, :2]
         half = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
         return np.clip([below.min(axis=0), below.max(axis=0)], -half, half)
@@ -155,16 +155,11 @@ class SolidPad:
         half = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
         down = underside.lowest_over(-half, half)
         if not down < NO_CONTACT_MM:
-            low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-            raise InputError(
-                f"The object misses the sensor: it spans x {low[0]:.4g} to {high[0]:.4g} mm and y {low[1]:.4g} to {high[1]:.4g} "
-                f"mm, and nothing of it is over the {2 * half[0]:g} x {2 * half[1]:g} mm footprint about the origin; correct its "
-                "pose."
-            )
+            raise misses_sensor(triangles.reshape(-1, 3), self.sensor.spec.footprint_mm)
         return triangles + [0.0, 0.0, self.height_mm - min(down, self.shell.stop_mm(underside))]
 
     def _held(self):
-        """The layers' mesh, and what holds it {face: axes}."""
+        """The layers' mesh, and its held faces {face: axes}."""
         held_to = self.height_mm - self.sensor.spec.edge.held_below_mm
         mesh = self.mesh.with_faces(shell=lambda x: _on_rim(x, self._lines) & (x[:, 2] < held_to)) if held_to > 0 else self.mesh
         base = self._frusta is None and self.sensor.spec.base_held
@@ -186,7 +181,7 @@ class SolidPad:
             body.add(FrustumItem(above, root, law, bonded=spec.tips_bonded, friction=spec.friction.board))
 
     def _frustum_law(self) -> FrustumLaw:
-        """Of bonded tips: where they may slide, the item lets them."""
+        """The law of frusta with bonded tips; the item lets tips slide where they may."""
         known = self.sensor.prepared_models.get("frustum")
         return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"])
 
@@ -278,7 +273,7 @@ class SolidPad:
 
 
 def _layers(spec) -> tuple[float, float]:
-    """Thicknesses in mm of what lies below and above the map's plane, without frusta."""
+    """Thicknesses in mm of the layers below and above the map's plane, without frusta."""
     sheet = getattr(spec.dielectric, "sheet_thickness_mm", None)
     below = spec.dielectric.thickness_mm if sheet is None else sheet
     return float(below), float(spec.cover.thickness_mm) if spec.cover is not None else 0.0
@@ -297,7 +292,7 @@ def _points_below(triangles: np.ndarray, height: float) -> np.ndarray:
 
 
 def _split(line: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Ends of elements along an axis, those between `low` and `high` (mm) divided so that enough are across."""
+    """Ends of elements along an axis, those between `low` and `high` (mm) divided to `_ACROSS` elements there."""
     sizes = np.diff(line)
     parts = np.clip(np.ceil(sizes * _ACROSS / max(high - low, 1e-9) - 1e-9), 1, _MOST_PARTS).astype(int)
     touched = (line[1:] > low) & (line[:-1] < high)
@@ -306,7 +301,7 @@ def _split(line: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def _shapes_over(xy: np.ndarray, pitch: float, parts: tuple[int, ...]) -> np.ndarray:
-    """Shape functions (s, nodes) at places (s, 2) about the middle of a square of so many elements along x and y."""
+    """Shape functions (s, nodes) at places (s, 2) about the middle of a square of `parts` elements along x and y."""
     along = []
     for axis, count in enumerate(parts):
         place = (xy[:, axis] / pitch + 0.5) * count

@@ -1,4 +1,4 @@
-"""What a press is asked for: an object, forces or a motion, and options; read, checked, and in one form."""
+"""The task of a press: an object, forces or a motion, and options; read, checked and in one form."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +33,7 @@ class PressOptions(TypedDict, total=False):
     tolerance_mm: float
     """Of the policy `error`: root mean square over the map in mm (0.01)."""
     label: str
-    """What its progress on stderr begins with ("press"); an empty one writes nothing."""
+    """First words of its progress on stderr ("press"); an empty one writes nothing."""
     threads: int | None
     """Of the linear algebra; by default one for each core."""
     keep_body: bool
@@ -44,7 +44,7 @@ class PressOptions(TypedDict, total=False):
     time_limit_s: float | None
     """Seconds after which the press ends in a TimeLimitError."""
     on_step: "Callable[[PressResult], None] | None"
-    """Called with the result so far at each load step that is reached but the last."""
+    """Called with the partial result after each completed load step except the last."""
 
 
 class BatchOptions(TypedDict, total=False):
@@ -53,12 +53,12 @@ class BatchOptions(TypedDict, total=False):
     workers: int | None
     """Processes; by default one for each core."""
     device: str
-    """`cuda`, or `auto` where there is one, takes all presses of the elastic model to a GPU as one batch; the other models', and
-    those on the `cpu`, go over processes."""
+    """`cuda`, or `auto` where there is a GPU, runs all presses of the elastic model on it as one batch; presses of the other
+    models, and those on the `cpu`, run in processes."""
     failures: str
     """`raise` the first, after all are done (default), or `keep` each error in its press' place."""
     label: str
-    """What the progress on stderr begins with ("presses")."""
+    """First words of the progress on stderr ("presses")."""
     policy: str
     """As for `Sensor.press`."""
     tolerance_mm: float
@@ -66,11 +66,11 @@ class BatchOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class Course:
-    """How a press goes about its work, apart from what it computes."""
+class RunControl:
+    """How a press runs; no option changes its numbers."""
 
     label: str = "press"
-    """What its progress begins with; nothing is written where it is empty."""
+    """First words of its progress; nothing is written where it is empty."""
     threads: int = 1
     """Of the linear algebra."""
     keep_body: bool = False
@@ -78,23 +78,23 @@ class Course:
     keep_object: bool = False
     """Whether the result holds a rigid object where it is at each load step."""
     time_limit_s: float | None = None
-    """Wall-clock seconds, after which a press ends with what it has reached."""
+    """Wall-clock seconds, after which a press ends with the completed load steps."""
     reached: Reached = field(default_factory=Reached)
-    """Keeps the load steps that are reached."""
+    """Keeps the completed load steps."""
 
 
 @dataclass(frozen=True)
 class PressTask:
-    """A press as the models take it."""
+    """A press in the form that the models take."""
 
     pressed: trimesh.Trimesh | SoftObject
     """The object, in mm."""
     pose: Pose | None
     """Its pose in the sensor frame; None: centred."""
     motion: Motion
-    """What it does."""
-    course: Course
-    """How the press goes about its work."""
+    """Its motion."""
+    control: RunControl
+    """How the press runs."""
     policy: str = "error"
     """How model="auto" chooses."""
     tolerance_mm: float = TOLERANCE_MM
@@ -102,7 +102,7 @@ class PressTask:
 
     @property
     def soft(self) -> bool:
-        """Whether the object bends."""
+        """Whether the object is a `SoftObject`."""
         return isinstance(self.pressed, SoftObject)
 
 
@@ -112,16 +112,16 @@ def task_of(spec: "Specification", pressed: "trimesh.Trimesh | SoftObject | str 
     refuse_unknown(options, PressOptions)
     given = dict(options)
     on_step = given.pop("on_step", None)
-    how = {name: given.pop(name) for name in ("policy", "tolerance_mm") if name in given}
-    course = Course(**given | {"threads": given.get("threads") or cores()}, reached=Reached(on_step))
+    choice = {name: given.pop(name) for name in ("policy", "tolerance_mm") if name in given}
+    control = RunControl(**given | {"threads": given.get("threads") or cores()}, reached=Reached(on_step))
     if not isinstance(pressed, SoftObject):
         pressed = mesh_of(pressed, unit)
     check_loads(motion, spec.force_range_n, spec.name)
-    return PressTask(pressed, None if pose is None else Pose.of(pose), motion, course, **how)
+    return PressTask(pressed, None if pose is None else Pose.of(pose), motion, control, **choice)
 
 
 def refuse_unknown(options: Mapping[str, Any], known: Any) -> None:
-    """Refuse an option that is none of a TypedDict's."""
+    """Refuse an option that a TypedDict does not have."""
     for name in options:
         if name not in known.__annotations__:
             hint = unknown(name, list(known.__annotations__), kind="option")
@@ -140,7 +140,7 @@ def mesh_of(mesh: trimesh.Trimesh | str | Path, unit: str | None) -> trimesh.Tri
 def motion_of(spec: "Specification", force_n: float | Sequence[float] | None, motion: Motion | str | None) -> Motion:
     """The motion of a press by forces (N), by a `Motion` or by its text.
 
-    InputError where both or neither are given, or a force is out of the sensor's range.
+    InputError where both or neither is given, or a force is outside the sensor's range.
     """
     if (motion is None) == (force_n is None):
         raise InputError("A press takes either force_n or motion; give one of them.")

@@ -3,9 +3,9 @@
 bodies kept by the hyperelastic model, or by the solid one on layers: the solver's whole mesh, and the object's pressure on
 the faces of the sensing surface; frusta of the solid model are springs, and are not drawn
 solids: their mesh with its regions and faces, and at the nodes of each step displacement, J, von Mises stress and contact pressure
-else the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical displacement is known there,
-and no pressure on the map's grid
-The object is beside them where it was kept (`Sensor.press(keep_object=True)`).
+else the deformation map as a surface, with the sensor's walls and bottom at rest; only the map's vertical displacement is known
+there, and no pressure
+The object is added where it was kept (`Sensor.press(keep_object=True)`).
 """
 
 import re
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
     from softtact.press.result import PressResult
 
 LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4, "object": 5}
-_DISPLACEMENT, _PRESSURE = "displacement_mm_", "contact_pressure_mpa_"     # with `PressedMesh._ends`
+_DISPLACEMENT, _PRESSURE = "displacement_mm_", "contact_pressure_mpa_"     # followed by `PressedMesh._ends`
 _LOAD_STEP = re.compile(r"displacement_mm_(.+?)N(?:_step(\d+))?")
-# Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
+# Faces of VTK's cells by their corners, for the cells that `surface` draws.
 _FACES = {"hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
           "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),),
           "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)), "triangle": ((0, 1, 2),)}
 
 
 def write(result: "PressResult", path: str | Path) -> None:
-    """Write what a press' result holds of the sensor: bodies, else solids, else the map."""
+    """Write the sensor of a press' result: its bodies, else its solids, else its map."""
     if not result.bodies and result.solid is not None:
         return _write_solid(result.solid, path)
     mesh = of_bodies(result.bodies, result.normal_force_n) if result.bodies else of_map(
@@ -90,7 +90,7 @@ class PressedMesh:
             mesh.write(temporary, file_format="vtu")
 
     def _ends(self) -> list[str]:
-        """What the arrays' names end with: the force, and the step's number where forces repeat, as in a motion."""
+        """Ends of the arrays' names: the force, and the step's number where forces repeat, as in a motion."""
         ends = [f"{force:g}N" for force in self.force_n]
         return ends if len(set(ends)) == len(ends) else [f"{end}_step{number}" for number, end in enumerate(ends, start=1)]
 
@@ -104,7 +104,7 @@ class PressedMesh:
     def surface(self, *, of_object: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (n', 3) on the sensor's outside, triangles (m, 3) of them, and their numbers (n',) in `points`.
 
-        of_object: of the object in place of the sensor; no points where the mesh has none
+        of_object: the object's in place of the sensor's; no points where the mesh has no object
         """
         faces = [corners for kind, nodes, layer in self.cells if (layer == LAYERS["object"]) == of_object
                  for corners in _outer_faces(kind, nodes)]
@@ -138,7 +138,7 @@ def read_vtu(path: str | Path) -> PressedMesh:
 
 
 def of_map(maps_mm: np.ndarray, x_mm: np.ndarray, y_mm: np.ndarray, force_n: np.ndarray, *, thickness_mm: float) -> PressedMesh:
-    """The `PressedMesh` of deformation maps (l, ny, nx): a pressed face in walls and a bottom that are as at rest."""
+    """The `PressedMesh` of deformation maps (l, ny, nx): a pressed face, with walls and a bottom at rest."""
     number = np.arange(len(y_mm) * len(x_mm)).reshape(len(y_mm), len(x_mm))
     top = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
     x, y = np.meshgrid(x_mm, y_mm)

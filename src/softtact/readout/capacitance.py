@@ -6,11 +6,11 @@ phi(z) area share of the solid at height z;  eps relative permittivity of the so
 Within the height z solid and air lie side by side, so their permittivities add by area: eps(z) = 1 + (eps - 1) phi(z). Slices over
 one another are capacitors in series: C = eps0 / (integral dz / eps(z) + t / eps).
 That every height is an equipotential makes this an upper bound; straight field lines (columns of air and solid in series, side by
-side) make a lower one (J. W. Strutt, Phil. Trans. 161, 1871; J. C. Maxwell, Treatise, 1873, art. 306 to 308). Why the upper one was
-taken, and how far the field of the cell lies from it: docs/explanation/virtual_sensor.md.
+side) make a lower one (J. W. Strutt, Phil. Trans. 161, 1871; J. C. Maxwell, Treatise, 1873, art. 306 to 308). Reasons for the upper
+one, and its difference from the field of a cell: docs/explanation/virtual_sensor.md.
 
-The solid keeps its volume. The sheet is confined, so the frusta alone give: each slice spreads as its height shrinks,
-phi = min(1, k phi at rest), until the pocket between the frusta is full; what then still moves compresses solid.
+The solid keeps its volume. The sheet is confined, so only the frusta deform: each slice spreads as its height shrinks,
+phi = min(1, k phi at rest), until the pocket between the frusta is full. Further movement compresses the solid.
 """
 
 import functools
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 EPSILON_0_PF_PER_MM = 8.8541878128e-3
-_LEAST_GAP = 0.02         # of the dielectric's thickness: the plates cannot meet
+_LEAST_GAP = 0.02         # of the dielectric's thickness, so that the plates never meet
 _SLICES, _STATES = 400, 2001
 
 
@@ -48,8 +48,8 @@ def _pocket(frusta, permittivity):
 def equivalent_air_gap(spec: "AnySpec", displacement_mm: float | np.ndarray) -> np.ndarray:
     """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`.
 
-    Of a plain layer the movement against its lower side, by which it is thinner. It keeps its volume and spreads; the electrodes
-    do not, so their area stays, and what lies beyond their edges is the fringe's.
+    For a plain layer that is the decrease of its thickness. The layer keeps its volume and spreads. The electrodes do not, so their
+    area is constant, and the dielectric beyond their edges belongs to the fringe field.
     """
     d: Any = spec.dielectric
     moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)

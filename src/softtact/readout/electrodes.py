@@ -13,7 +13,7 @@ def taxel_means(spec: "BaseSpec", field: np.ndarray, *, spacing_mm: float = 0.0,
                 shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Means (..., rows, columns) over the electrodes of a field (..., y, x) on the deformation map's grid.
 
-    Exact for the field's piecewise linear interpolant, which goes on unchanged beyond the map's edge.
+    Exact for the field's piecewise linear interpolant, which is constant beyond the map's edge.
     spacing_mm: between neighbouring electrodes, each in the middle of its taxel;  shift_mm: (x, y) of the object over the sensor
     """
     rows, columns = electrode_weights(spec, spacing_mm=spacing_mm, shift_mm=shift_mm)
@@ -29,7 +29,7 @@ def electrode_weights(spec: "BaseSpec", *, spacing_mm: float = 0.0,
 
 @lru_cache(maxsize=32)     # the same for all presses of a sensor, and a tenth of a press with the elastic model
 def _averaging(grid, count, *, spacing=0.0, shift=0.0):
-    """Weights (count, grid): means over equal parts of the side, each shorter by `spacing`, of what moved by `shift`."""
+    """Weights (count, grid): means over equal parts of the side, each shorter by `spacing`, of a field moved by `shift`."""
     grid = np.array(grid)
     edges = np.linspace(grid[0], grid[-1], count + 1)
     weights = np.zeros((count, len(grid)))
@@ -66,7 +66,7 @@ def fringe_factor(spec: "BaseSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0
     """Factors (..., rows, columns) of the taxels' capacitance for gaps (..., rows, columns) in mm.
 
     The two pairs of edges add up. Palmer multiplies them, which is 3 to 6 % above the field of square plates, the sum 1.5 %.
-    outer, inner: share of `edge_excess` that an edge on the sensor's border has, and one with a neighbour (1: as if alone)
+    outer, inner: share of `edge_excess` for an edge on the sensor's border, and for one with a neighbour (1: as without neighbour)
     """
     sides = electrode_sides(spec, spacing_mm=spacing_mm)
     along_x = _edge_share(spec.taxels.columns, outer, inner)[None, :]

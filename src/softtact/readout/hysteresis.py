@@ -1,7 +1,7 @@
 """Viscoelastic lag of the deformation behind the force, over the history of loading.
 
 Quasi-linear viscoelasticity (Y. C. Fung, Biomechanics, 1993, ch. 7.6) in its creep form, since the press prescribes the force: the
-press' own map u_e(F) is the deformation after a long time under F, and what is felt at time t is
+map u_e(F) of a press is the deformation after a long time under F, and the deformation at time t is
 
     u(t) = integral of J(t - s) du_e/ds ds,   J(t) = 1 - sum_i g_i exp(-t / tau_i),
 
@@ -23,8 +23,8 @@ import numpy as np
 class LoadHistory:
     """Corners of a history of force that is piecewise linear in time.
 
-    times_s (n,): never falling; two alike are a jump;  load step (n,): index of the load step, 0 no force, 1 the first load step
-    loading, unloading (load steps,): which corner is read, in the order of the load steps
+    times_s (n,): not falling; two equal times are a jump;  load_step (n,): number of the load step, 0 without force
+    loading, unloading (load steps,): index of the corner that is read at each load step
     """
 
     times_s: np.ndarray
@@ -35,9 +35,10 @@ class LoadHistory:
 
 def staircase(force_n: np.ndarray, *, rate_n_per_s: float, hold_s: float, cycles_before: int = 0,
               rest_s: float = 0.0) -> LoadHistory:
-    """The `LoadHistory` of a press: up the load steps (N, rising) and down again, each held and read at the end of its hold.
+    """The `LoadHistory` of a press: up the load steps (N, rising) and down, each held and read at the end of its hold.
 
-    cycles_before: to the highest load step and back without holds, `rest_s` without force after each;  rate_n_per_s: inf for jumps
+    cycles_before: number of cycles to the highest load step and back without holds, each followed by `rest_s` without force;
+    rate_n_per_s: inf for jumps
     """
     count = len(force_n)
     cycle = [*range(1, count + 1), *range(count - 1, -1, -1), 0]
@@ -53,29 +54,30 @@ def staircase(force_n: np.ndarray, *, rate_n_per_s: float, hold_s: float, cycles
 
 
 def lagged(values: np.ndarray, times_s: np.ndarray, *, shares: Sequence[float], time_constants_s: Sequence[float]) -> np.ndarray:
-    """Delayed values (n, ...) at `times_s` (n,) of elastic values (n, ...), linear between; at the first one in equilibrium.
+    """Delayed values (n, ...) at `times_s` (n,) of elastic values (n, ...), linear between these times; in equilibrium at the
+    first.
 
     shares, time_constants_s (terms,): g_i and tau_i in s; without terms the values themselves
     """
     values = np.asarray(values, dtype=float)
     out = values.copy()
     for share, tau in zip(shares, time_constants_s, strict=True):
-        out -= _not_yet_arrived(values, np.diff(times_s) / tau, share)
+        out -= _delayed_part(values, np.diff(times_s) / tau, share)
     return out
 
 
-def _not_yet_arrived(values, steps, share):
-    """q (n, ...) of one term; steps (n - 1,): durations over its time constant."""
-    late = np.zeros_like(values)
+def _delayed_part(values, steps, share):
+    """Delayed part q (n, ...) of one term; steps (n - 1,): durations over its time constant."""
+    delayed = np.zeros_like(values)
     for k, step in enumerate(steps):
-        arriving = -np.expm1(-step) / step if step > 0 else 1.0     # mean of exp(-s) over the step
-        late[k + 1] = np.exp(-step) * late[k] + share * arriving * (values[k + 1] - values[k])
-    return late
+        mean_decay = -np.expm1(-step) / step if step > 0 else 1.0     # mean of exp(-s) over the step
+        delayed[k + 1] = np.exp(-step) * delayed[k] + share * mean_decay * (values[k + 1] - values[k])
+    return delayed
 
 
-def felt_branches(maps: np.ndarray, history: LoadHistory, *, shares: Sequence[float],
+def delayed_branches(maps: np.ndarray, history: LoadHistory, *, shares: Sequence[float],
                   time_constants_s: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
     """Delayed maps (load steps, ...) during loading and unloading, from elastic maps (load steps, ...) of the same load steps."""
     elastic = np.concatenate([np.zeros((1, *maps.shape[1:])), maps])[history.load_step]
-    felt = lagged(elastic, history.times_s, shares=shares, time_constants_s=time_constants_s)
-    return felt[history.loading], felt[history.unloading]
+    delayed = lagged(elastic, history.times_s, shares=shares, time_constants_s=time_constants_s)
+    return delayed[history.loading], delayed[history.unloading]

@@ -1,4 +1,4 @@
-"""The readout `points`: contact pressure and displacement as means around points, as a taxel or a marker under a skin has them.
+"""The readout `points`: mean contact pressure and displacement around points, such as taxels or markers under a skin.
 
     readouts: {tips: {kind: points, points_mm: [[0, 0, 5], [2, 0, 4.5]], radius_mm: 1.0}}
 """
@@ -23,8 +23,8 @@ QUANTITIES, UNITS = ("pressure", "x", "y", "z"), ("MPa", "mm", "mm", "mm")
 class Points(FiniteSection):
     """Means over the parts of a face that lie within a radius of points at rest, weighted by area.
 
-    Readings (step, point, quantity): contact pressure in MPa, then displacement along x, y, z in mm; nan where it is not known, and
-    pressures off the surface in contact.
+    Readings (step, point, quantity): contact pressure in MPa, then displacement along x, y, z in mm; nan where they are not known,
+    and for pressures off the contact surface.
     """
 
     points_mm: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=1)]
@@ -40,7 +40,7 @@ class Points(FiniteSection):
             values[step, :, 1:] = [samples.area_mm2[part] @ samples.values[part] / samples.area_mm2[part].sum() for part in near]
         if pressed is not None:
             areas = [moved[0].area_mm2[part].sum() for part in near]
-            for step, samples in enumerate(pressed):      # the force over parts that fill the face is the whole force
+            for step, samples in enumerate(pressed):      # so the forces on parts that fill the face sum up to the whole force
                 within = cKDTree(samples.points_mm).query_ball_point(self.points_mm, self.radius_mm)
                 values[step, :, 0] = [samples.area_mm2[part] @ samples.values[part] / area
                                       for part, area in zip(within, areas, strict=True)]

@@ -1,4 +1,4 @@
-"""A recording of a sensor's two fingers over time as one labelled data set, and what is wrong with it.
+"""A recording of a sensor's two fingers over time as one labelled data set, and its faults.
 
 Variables: counts (time, finger, row, column) over the baseline; baseline (finger, row, column); row_of_file (time); where known
 dynamic (time, finger), acceleration and angular_rate (time, finger, axis), force_n (time, finger). Coordinate: time in s from the
@@ -6,8 +6,8 @@ first reading. Attributes: source, file, start_ms.
 
 Order of the taxels. The maker's protocol sends 28 numbers a finger row by row, 7 rows of 4 columns; taxel k is row k // 4, column
 k % 4. That row 0 lies at the lowest y and column 0 at the lowest x of the sensor frame, and that each finger has a frame, z out of
-its sensing surface, is printed nowhere and assumed. A press off the centre shows it: `softtact calibrate` says
-when a recording follows a press better with rows or columns turned round.
+its sensing surface, is documented nowhere and assumed. A press off the centre shows it: `softtact calibrate` reports
+when a recording fits a press better with rows or columns reversed.
 """
 
 from collections.abc import Sequence
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 FINGERS, ROWS, COLUMNS = 2, 7, 4
 TAXELS = ROWS * COLUMNS
-LARGEST_RAW = 65535                 # of the 16 bits that a taxel is sent in
+LARGEST_RAW = 65535                 # of the 16 bits of a taxel
 AXES = ("x", "y", "z")
-_MOVES = 30.0                       # counts by which a finger moves that is pressed at all: five deviations of the virtual noise
-_LATE_S = 0.05                      # by which a log of forces may begin late or end early: a few of its own rows
+_MOVES = 30.0                       # counts: least change of a pressed finger; five standard deviations of the virtual noise
+_LATE_S = 0.05                      # by which a log of forces may begin late or end early: a few rows of the log
 
 _DIMENSIONS = {"counts": ("time", "finger", "row", "column"), "baseline": ("finger", "row", "column"),
                "dynamic": ("time", "finger"), "acceleration": ("time", "finger", "axis"),
@@ -38,7 +38,7 @@ _UNITS = {"counts": "counts", "baseline": "counts", "dynamic": "raw", "accelerat
 
 
 class RecordedArrays(TypedDict, total=False):
-    """What a recording may hold beside its counts."""
+    """Optional arrays of a recording."""
 
     dynamic: np.ndarray
     """(time, finger): raw, as the maker's electronics send it."""
@@ -56,8 +56,8 @@ def make_recording(time_s: np.ndarray | Sequence[float], counts: np.ndarray, *, 
                    start_ms: int = 0, file: str = "", **arrays: Unpack[RecordedArrays]) -> "xarray.Dataset":
     """A recording (see this module) of counts (time, finger, row, column) over the baseline at times (time,) in s.
 
-    source: what the numbers are, as "simulated: softtact";  baseline (finger, row, column): raw counts at rest, 0 by default
-    start_ms: of the recorder's clock at time 0;  file: that the recording comes from
+    source: origin of the numbers, such as "simulated: softtact";  baseline (finger, row, column): raw counts at rest, 0 by default
+    start_ms: the recorder's clock at time 0;  file: source file of the recording
     Raises InputError where shapes do not fit or time runs back.
     """
     import xarray
@@ -77,13 +77,13 @@ def make_recording(time_s: np.ndarray | Sequence[float], counts: np.ndarray, *, 
         return xarray.Dataset(variables, coords={"time": ("time", time, {"units": "s"})},
                               attrs={"source": source, "file": file, "start_ms": int(start_ms)})
     except ValueError as error:
-        raise InputError(f"A recording's arrays do not fit each other ({error}); give them as make_recording states.") from None
+        raise InputError(f"A recording's arrays do not fit each other ({error}); see make_recording for their shapes.") from None
 
 
 def clipped(recording: "xarray.Dataset", *, largest: float | None = None) -> np.ndarray:
-    """Where (time, finger, row, column) a taxel reads the end of its range, and may have meant more.
+    """Where (time, finger, row, column) a taxel reads the end of its range, so that the true value may be larger.
 
-    largest: counts over the baseline at which the readout ends, beside the 16 bits; one that the recording exceeds is not its end
+    largest: counts over the baseline at which the readout ends, beside the 16 bits; ignored where the recording exceeds it
     """
     counts, baseline = recording.counts.values, recording.baseline.values
     at_end = counts + baseline >= LARGEST_RAW
@@ -116,7 +116,7 @@ def findings(recording: "xarray.Dataset", *, largest: float | None = None) -> li
 
 
 def row_of(recording: "xarray.Dataset", reading: int) -> int:
-    """Row of its file that a reading stands in, or its number where there is no file."""
+    """Row of a reading in its file, or its number where there is no file."""
     return int(recording.row_of_file[reading]) if "row_of_file" in recording else reading
 
 
@@ -128,8 +128,8 @@ def taxel_in_words(finger: int, row: int, column: int) -> str:
 def with_force(recording: "xarray.Dataset", path: str | Path) -> "xarray.Dataset":
     """The recording with `force_n` (time, finger) from a CSV of a load cell or a gripper, linear between its rows.
 
-    Its columns: `time_s`, from the recording's first reading on, or `Time(ms)`, of the recorder's clock; and `force_n`, of both
-    fingers alike, or `force_n_0` and `force_n_1`. Raises InputError where it does not cover the recording.
+    Its columns: `time_s`, from the recording's first reading on, or `Time(ms)`, of the recorder's clock; and `force_n`, for both
+    fingers, or `force_n_0` and `force_n_1`. Raises InputError where it does not cover the recording.
     """
     table = read_table(path, what="log of forces")
     clock = "Time(ms)" if "Time(ms)" in table.header else "time_s"
@@ -151,7 +151,7 @@ def _span(time):
 
 
 def refuse_running_back(path: Path, time: np.ndarray, rows: Sequence[int], *, unit: str) -> None:
-    """Refuse times (n,) that fall, by the row (of the file) at which they do."""
+    """Refuse times (n,) that fall; the message names the file's row."""
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         at = int(back[0])

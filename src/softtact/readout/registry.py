@@ -8,10 +8,10 @@
         def read(self, surface: SurfaceMotion) -> xarray.DataArray:
             return labelled(self.scale * surface.thinning_mm.mean(axis=(1, 2)), ("step",), units="mm")
 
-A sensor's `readouts:` name them: {depth: {kind: mean_depth, scale: 2}}; `PressResult.readings["depth"]` is what it reads, and files
-hold it. A user's readout is registered when its module is imported before the sensor is loaded. A class of pydantic's, or a
-dataclass, checks its fields; `read` raises InputError for what does not fit the sensor: it is tried at rest when the sensor is
-loaded.
+A sensor's `readouts:` name them: {depth: {kind: mean_depth, scale: 2}}; `PressResult.readings["depth"]` holds its readings, and so
+do files. A user's readout is registered when its module is imported before the sensor is loaded. A class of pydantic's, or a
+dataclass, checks its fields; `read` raises InputError where the readout does not fit the sensor; it is called at rest when the
+sensor is loaded.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +34,7 @@ _Class = TypeVar("_Class", bound=type)
 
 @dataclass(frozen=True)
 class Samples:
-    """A field on a part of a surface, at points that stand for areas."""
+    """A field on a part of a surface, at points with areas."""
 
     points_mm: np.ndarray
     """(k, 3) at rest."""
@@ -49,7 +49,7 @@ class SurfaceMotion:
     """The motion of a sensing surface in a press: the input of readouts at each load step."""
 
     spec: Specification
-    """The sensor's."""
+    """Of the sensor."""
     steps: int
     """Number of load steps."""
     displacement: Callable[[str | None], list[Samples]]
@@ -61,7 +61,7 @@ class SurfaceMotion:
     gap: Callable[[str | None], list[Samples] | None] = lambda face: None
     """Of a face or the sensing surface: gap in mm between it and the object along the normal, negative in penetration."""
     thinning_mm: np.ndarray | None = None
-    """(step, y, x): by how much the layers are thinner at the points of the sensor's map; None where there are none."""
+    """(step, y, x): decrease of the layers' thickness in mm at the points of the sensor's map; None without layers."""
 
 
 class Readout(Protocol):
@@ -72,7 +72,7 @@ class Readout(Protocol):
 
 
 def register(kind: str) -> Callable[[_Class], _Class]:
-    """Decorate the class of a readout with the kind that sensors' files call it by."""
+    """Class decorator: register a readout under the kind that sensors' files name."""
     def add(cls: _Class) -> _Class:
         _KINDS[kind] = cls
         return cls
@@ -97,7 +97,7 @@ def make_readout(name: str, entry: ReadoutEntry, *, where: str = "sensor") -> Re
 
 
 def readings_of(readouts: Mapping[str, Readout], surface: SurfaceMotion) -> "dict[str, xarray.DataArray]":
-    """{name: what each of the readouts reads}."""
+    """{name: readings} of the readouts."""
     return {name: readout.read(surface) for name, readout in readouts.items()}
 
 

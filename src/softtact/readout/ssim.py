@@ -30,8 +30,8 @@ def mean_absolute_counts(predicted: np.ndarray, measured: np.ndarray) -> np.ndar
 def own_range_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int) -> np.ndarray:
     """SSIM (n,) as of `map_ssim`, each with the largest count of its measured map as data range.
 
-    SSIM's two constants grow with the range: with a readout's whole range they forgive what is wrong with a faint map. The range is
-    at least LEAST_RANGE counts, so that noise on an empty map is not taken for a shape.
+    SSIM's two constants grow with the range: with a readout's whole range they hide the errors of a faint map. The range is at
+    least LEAST_RANGE counts, so that noise on an empty map does not count as a shape.
     """
     check_maps(predicted, measured, window)
     ranges = np.maximum(np.abs(measured).max(axis=(1, 2)), LEAST_RANGE)
@@ -42,7 +42,7 @@ def own_range_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int) 
 def others_mean(trials: np.ndarray) -> np.ndarray:
     """For each reading (trial, row, column) the mean of the others.
 
-    That is what a predictor could reach that knows the sensor perfectly but not the trial's noise.
+    A predictor that knows the sensor perfectly, but not the trial's noise, reaches this.
     """
     return (trials.sum(axis=0, keepdims=True) - trials) / (len(trials) - 1)
 

@@ -2,10 +2,10 @@
 
     readouts: {rim: {kind: strip, x_mm: [-11, -9], y_mm: [-18, 18]}}
 
-A strip under contact sums up the contact pressure over it. A film inside a body has no contact: the normal traction t of the face
-that it lies on follows from the internal forces f at the face's nodes, M t = f with the face's mass matrix M, so that the traction
-is in balance with the forces (consistent flux recovery: Hughes et al., J. Comput. Phys. 163 (2000) 467). A film's force is then q .
-f with q = M^-1 int_film N dx. The sum over a whole face is that of its forces, to rounding.
+The force of a strip under contact is the integral of the contact pressure over it. A film inside a body has no contact: the normal
+traction t of the face that it lies on follows from the internal forces f at the face's nodes, M t = f with the face's mass matrix
+M, so that the traction is in balance with the forces (consistent flux recovery: Hughes et al., J. Comput. Phys. 163 (2000) 467). A
+film's force is then q . f with q = M^-1 int_film N dx. The sum over a whole face is that of its forces, to rounding.
 """
 
 from dataclasses import dataclass
@@ -62,12 +62,12 @@ class Strip(FiniteSection):
 
 @dataclass(frozen=True)
 class FilmReader:
-    """Reads the force on a film, between two values of x on a face of a plane body, off the displacement of the body's nodes."""
+    """The force on a film, between two values of x on a face of a plane body, from the displacement of the body's nodes."""
 
     body: SolidBody
     """The body."""
     region: str
-    """Its part that the film lies on."""
+    """The region that the film lies on."""
     nodes: np.ndarray
     """(k,) of the face."""
     weight: np.ndarray
@@ -90,7 +90,7 @@ class FilmReader:
         for region, nodes, block in self.body.blocks:
             if region == self.region:
                 state = block.evaluate(displacement[nodes])
-                assert state is not None       # the state was balanced with these elements
+                assert state is not None       # the balanced state has valid elements
                 add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
         return float(self.sign * (self.weight @ force[self.nodes, 1]))
 

@@ -36,7 +36,7 @@ class Capacitance(FiniteSection):
 def relative_change(spec: "AnySpec", displacement_mm: np.ndarray, *, shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """dC / C0 (..., rows, columns) of the electrodes under a displacement (..., y, x) in mm, with their edges and neighbours.
 
-    shift_mm: (x, y) of the object over the sensor, beside where it was pressed
+    shift_mm: (x, y) by which the object is displaced over the sensor, relative to the press
     """
     rest = taxel_capacitance(spec, np.zeros(displacement_mm.shape[-2:]))      # type: ignore[arg-type]
     return taxel_capacitance(spec, displacement_mm, shift_mm=shift_mm) / rest - 1      # type: ignore[arg-type]

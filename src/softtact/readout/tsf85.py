@@ -1,12 +1,12 @@
 """Recordings of the TSF-85 as files: the maker's recorder, read and written, and the authors' extension, read.
 
     recorder    Time(ms);D0_0;D0_1;S0_0..S27_0;S0_1..S27_1;Ax0;Ay0;Az0;Ax1..Az1;Gx0..Gz1     `;` between whole numbers
-    extension   time_sec,frame,pred_0..pred_27     what its network reads;     time_sec,frame,dz_0..dz_399     its 25 x 16 nodes
+    extension   time_sec,frame,pred_0..pred_27     readings of its network;   time_sec,frame,dz_0..dz_399     its 25 x 16 nodes
 
 Columns are found by the header, in any order; dynamic and inertial ones may be missing together. The recorder's first row is the
 baseline, with 0 in the columns D, A and G; in the others the baseline is taken off, unless it was started with `--keep-baseline`,
-which the file does not state. Format: github.com/robotiq/tactile_sensors, sensor_quickstart/record_data.py; extension:
-github.com/Lab-CORO/TSF-85, TSF_85_Ext (facts only). What is assumed of the taxels' order: `softtact.readout.recording`.
+which is not noted in the file. Format: github.com/robotiq/tactile_sensors, sensor_quickstart/record_data.py; extension:
+github.com/Lab-CORO/TSF-85, TSF_85_Ext (facts only). Assumed order of the taxels: `softtact.readout.recording`.
 """
 
 import re
@@ -27,10 +27,10 @@ TIME = "Time(ms)"
 RECORDER = "recorder of the TSF-85"       # source of its recordings
 BASELINES = ("auto", "subtracted", "kept")
 _STATIC = re.compile(r"S(\d+)_(\d+)")
-_LOW = 0.02             # of the readings of a taxel: as low as at rest, wherever in the recording it is at rest
-_CLEARLY = 0.5          # nearer by this factor to one of the two ways to write a baseline than to the other
+_LOW = 0.02             # share of a taxel's readings that is taken for readings at rest, wherever they are in the recording
+_CLEARLY = 0.5          # largest ratio of the distances from the two forms of baseline for a clear decision
 _BASELINE_MISSING = "the baseline is missing: put the recorder's first row back, or record again."
-_NODES = (25, 16)       # of the extension's mesh, rows along the longer side: assumed, as it numbers them nowhere
+_NODES = (25, 16)       # of the extension's mesh, rows along the longer side: assumed, as their order is documented nowhere
 
 
 def read_recording(path: str | Path, *, baseline: str = "auto") -> "xarray.Dataset":
@@ -53,11 +53,11 @@ def read_recording(path: str | Path, *, baseline: str = "auto") -> "xarray.Datas
 
 
 def write_recording(path: str | Path, recording: "xarray.Dataset", *, keep_baseline: bool = False) -> None:
-    """Write a recording as the maker's recorder does, so that every tool for it reads it; time is rounded to 1 ms.
+    """Write a recording as the maker's recorder does, so that tools for it can read it; time is rounded to 1 ms.
 
-    keep_baseline: leave the baseline in the readings. What is not known (dynamic, inertial) is written as 0. `force_n` has no place
-    in the format: write it beside (`recording.with_force` reads it back).
-    Raises InputError for another number of fingers or taxels, for counts that are no whole numbers or do not fit in 16 bits.
+    keep_baseline: leave the baseline in the readings. Missing values (dynamic, inertial) are written as 0. The format has no
+    `force_n`: write it to a separate file (`recording.with_force` reads it back).
+    Raises InputError for another number of fingers or taxels, for counts that are not whole numbers or do not fit in 16 bits.
     """
     shape = (FINGERS, ROWS, COLUMNS)
     if recording.counts.shape[1:] != shape:
@@ -97,11 +97,11 @@ def _known(recording, name, shape):
 
 
 def _check_whole(path, table, raw):
-    """Refuse what the format's whole numbers of 16 bits cannot hold."""
+    """Refuse numbers that the format's 16 bits cannot hold."""
     if not (np.isfinite(table).all() and (table == np.round(table)).all()):
         value = table[~(np.isfinite(table) & (table == np.round(table)))][0]
-        raise InputError(f"{path}: the recording holds {value:g}, and the recorder's format whole numbers; round the counts as the "
-                         "sensor's converter does.")
+        raise InputError(f"{path}: the recording holds {value:g}, but the recorder's format takes whole numbers; round the counts "
+                         "as the sensor's converter does.")
     if raw.min() < 0 or raw.max() > LARGEST_RAW:
         value = raw.min() if raw.min() < 0 else raw.max()
         raise InputError(f"{path}: counts and baseline together come to {value:g}, which 16 bits (0 to {LARGEST_RAW}) cannot hold; "
@@ -133,7 +133,7 @@ def _optional():
 
 
 def _check_header(path, header):
-    """Refuse a header with a column that is there twice, unknown or missing: a finger, a taxel, or a part of a group."""
+    """Refuse a header with a repeated, an unknown or a missing column: of a finger, a taxel or a group."""
     twice = next((name for name in header if header.count(name) > 1), None)
     if twice is not None:
         raise InputError(f"{path}, row 1: two columns are named {twice!r}; keep one.")
@@ -142,7 +142,7 @@ def _check_header(path, header):
         found.setdefault(finger, set()).add(taxel)
     for finger in range(FINGERS):
         if finger not in found:
-            raise InputError(f"{path}, row 1: finger {finger} is missing, for no column is named S0_{finger}; give a recording of "
+            raise InputError(f"{path}, row 1: finger {finger} is missing, as no column is named S0_{finger}; give a recording of "
                              "both fingers, as the recorder writes it.")
         if found[finger] != set(range(TAXELS)):
             odd = min(found[finger] ^ set(range(TAXELS)))
@@ -161,7 +161,7 @@ def _check_header(path, header):
 
 
 def _check_values(path, columns, rows):
-    """Refuse numbers that are not whole, or beyond what 16 bits and a baseline taken off can give."""
+    """Refuse numbers that are not whole, or larger than 16 bits less a baseline."""
     for name, values in columns.items():
         odd = values != np.round(values)
         if name != TIME:
@@ -177,7 +177,7 @@ def _baseline_off(path, columns, baseline, rows):
     placeholders = [name for group in _optional().values() for name in group if name in columns]
     if any(columns[name][0] for name in placeholders):
         name = next(name for name in placeholders if columns[name][0])
-        raise InputError(f"{path}, row {rows[0]}: it is no baseline, for {name} is {columns[name][0]:g} and the recorder writes 0 "
+        raise InputError(f"{path}, row {rows[0]}: it is no baseline, as {name} is {columns[name][0]:g} and the recorder writes 0 "
                          f"there; {_BASELINE_MISSING}")
     static = np.stack([columns[name] for name in _static()], axis=1).astype(int).reshape(-1, FINGERS, ROWS, COLUMNS)
     base, readings = static[0], static[1:]
@@ -185,7 +185,7 @@ def _baseline_off(path, columns, baseline, rows):
         raise InputError(f"{path}, row {rows[0]}: its baseline has {base.min()} counts, and raw counts are not negative; "
                          f"{_BASELINE_MISSING}")
     if baseline == "auto":
-        baseline = _how_written(path, base, readings)
+        baseline = _form_of_baseline(path, base, readings)
     counts = readings - base if baseline == "kept" else readings
     raw = counts + base
     if raw.min() < 0 or raw.max() > LARGEST_RAW:
@@ -196,14 +196,14 @@ def _baseline_off(path, columns, baseline, rows):
     return base, counts
 
 
-def _how_written(path, base, readings):
+def _form_of_baseline(path, base, readings):
     """Whether the baseline is subtracted from the readings or kept in them, by their lowest values."""
     if readings.min() < 0 or not base.any():
         return "subtracted"
     low = np.quantile(readings, _LOW, axis=0)
     off, on = (float(np.sqrt(np.mean(values**2))) for values in (low, low - base))
     if min(off, on) > _CLEARLY * max(off, on):
-        raise InputError(f"{path}: whether the baseline is taken off its readings is not clear, for the lowest lie {off:.0f} "
+        raise InputError(f"{path}: whether the baseline is subtracted from its readings is not clear, as the lowest are {off:.0f} "
                          f"counts from 0 and {on:.0f} from the baseline; state it (`baseline`, --baseline: subtracted, or kept).")
     return "subtracted" if off < on else "kept"
 

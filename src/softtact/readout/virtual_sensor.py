@@ -1,8 +1,8 @@
-"""The virtual sensor: what a real one would read of a reference press. A stand-in, and named so wherever it is used.
+"""The virtual sensor: simulated readings of a real sensor for a reference press. It replaces measurements, and is named as such.
 
 Reference deformation, moved and scaled as trials differ -> lag over the history of force -> capacitance of each electrode with its
 edges and neighbours -> gain, zero and drift of each taxel -> the converter. One seed is one specimen; trials differ in placement,
-force, drift and noise. Each effect, its default's reason and its switch: docs/explanation/virtual_sensor.md.
+force, drift and noise. Each effect, the reason for its default and its switch: docs/explanation/virtual_sensor.md.
 """
 
 import dataclasses
@@ -15,7 +15,7 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, equivalent_air_gap
 from softtact.readout.electrodes import coupled, electrode_sides, electrode_weights, fringe_factor, taxel_means
-from softtact.readout.hysteresis import felt_branches, staircase
+from softtact.readout.hysteresis import delayed_branches, staircase
 
 if TYPE_CHECKING:
     from softtact.sensors.frusta import SensorSpec
@@ -31,11 +31,11 @@ class VirtualSensorSettings:
 
     electrode_spacing_mm: between neighbours;  outer_fringe, inner_fringe: share of a free edge's field at the sensor's border, and
     between neighbours;  coupling: share of their difference that neighbours exchange;  sheet_scatter: standard deviation of the
-    sheet's thickness over the taxels, as a share, as the field sees it
-    relaxation, relaxation_s: numbers or lists, shares of the deformation that creep in late, and their time constants
+    sheet's thickness over the taxels, as a share, in the electric field
+    relaxation, relaxation_s: numbers or lists, delayed shares of the deformation (creep) and their time constants
     rate_n_per_s: of ramps between load steps (.inf: steps);  load_step_s: hold at a load step, read at its end;  cycles_before,
-    rest_s: to the highest load step and back before the press, and the rest after each
-    placement_mm, force_scatter: standard deviations of a trial's place (x, y) and of its forces, as a share
+    rest_s: number of cycles to the highest load step and back before the press, and the rest after each
+    placement_mm, force_scatter: standard deviations of a trial's position (x, y) and of its forces, as a share
     counts_per_relative_change: counts at dC/C0 = 1;  gain_scatter, offset_counts: standard deviations over taxels
     drift, drift_counts: standard deviations of each taxel's change of gain and zero from trial to trial
     dead_taxels: their numbers, row by row from 0;  dead_share: chance that a taxel is dead
@@ -77,7 +77,7 @@ class VirtualSensorSettings:
 
     @classmethod
     def ideal(cls, **changes: Any) -> Self:
-        """Every effect off, but for `changes`: the ideal counts, without limit above."""
+        """All effects off except `changes`: the ideal counts, without an upper limit."""
         off = {field.name: () if field.name in _LISTS else 0.0 for field in dataclasses.fields(cls)}
         kept = {name: getattr(cls, name) for name in ("rate_n_per_s", "load_step_s", "counts_per_relative_change")}
         return cls(**off | kept | {"largest_counts": np.inf} | changes)
@@ -108,9 +108,9 @@ class VirtualSensorSettings:
             if not (np.isscalar(value) and value >= 0 and (np.isfinite(value) or name in _MAY_BE_INFINITE)):
                 raise InputError(f"virtual_sensor: {name} is {value}; give one number of 0 or more.")
         if not (self.rate_n_per_s > 0 and (self.largest_counts is None or self.largest_counts > 0)):
-            raise InputError("virtual_sensor: rate_n_per_s and largest_counts must be above 0; .inf takes their effect away.")
+            raise InputError("virtual_sensor: rate_n_per_s and largest_counts must be above 0; .inf switches their effect off.")
         if self.coupling > 0.25:
-            raise InputError(f"virtual_sensor: coupling is {self.coupling:g}; four neighbours can take 0.25 each at most.")
+            raise InputError(f"virtual_sensor: coupling is {self.coupling:g}; with four neighbours it is 0.25 at most.")
 
         if self.sheet_scatter * _LARGEST_DEVIATION >= 1:
             raise InputError(f"virtual_sensor: sheet_scatter is {self.sheet_scatter:g}; from 0.4 on a sheet could vanish.")
@@ -126,7 +126,7 @@ class VirtualSensorSettings:
 
 @dataclass(frozen=True)
 class Specimen:
-    """One sensor as it was made: gain, offset_counts, sheet_excess_mm, dead, each (rows, columns)."""
+    """One specimen of the sensor: gain, offset_counts, sheet_excess_mm, dead, each (rows, columns)."""
 
     gain: np.ndarray
     offset_counts: np.ndarray
@@ -136,7 +136,7 @@ class Specimen:
 
 @dataclass(frozen=True)
 class Branches:
-    """Counts (trial, force, row, column) on the way up and on the way down."""
+    """Counts (trial, force, row, column) during loading and during unloading."""
 
     loading: np.ndarray
     unloading: np.ndarray
@@ -144,14 +144,14 @@ class Branches:
 
 def read_virtual_sensor(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n: Sequence[float] | np.ndarray, trials: int,
                         seed: int, item: str, settings: VirtualSensorSettings = VirtualSensorSettings()) -> np.ndarray:
-    """Counts (trial, force, row, column) on the way up; arguments as for `read_branches`."""
+    """Counts (trial, force, row, column) during loading; arguments as for `read_branches`."""
     return read_branches(spec, deformation_map_mm, force_n=force_n, trials=trials, seed=seed, item=item,
                          settings=settings).loading
 
 
 def read_branches(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n: Sequence[float] | np.ndarray, trials: int,
                   seed: int, item: str, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Branches:
-    """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` keeps presses apart."""
+    """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` varies the random numbers."""
     settings = settings.of_calibrated(spec)
     specimen = make_specimen(spec, seed=seed, settings=settings)
     history = staircase(np.asarray(force_n, dtype=float), rate_n_per_s=settings.rate_n_per_s, hold_s=settings.load_step_s,
@@ -164,9 +164,9 @@ def read_branches(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n
 
 
 def make_specimen(spec: "SensorSpec", *, seed: int, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Specimen:
-    """The `Specimen` of a seed. All is always drawn, so one effect switched off leaves the others as they were.
+    """The `Specimen` of a seed. All numbers are always drawn, so that switching one effect off does not change the others.
 
-    Of a sensor with a `calibration` it has the gains and zeros found there, which hold what its sheet's thickness does.
+    For a sensor with a `calibration` it has the gains and zeros found there, which include the effect of the sheet's thickness.
     """
     spec.need_frusta("the virtual sensor", "take the ideal readout, `PressResult.tactile_map`")
     if not settings.electrode_spacing_mm < min(electrode_sides(spec)):
@@ -190,7 +190,7 @@ def taxel_capacitance(spec: "SensorSpec", displacement_mm: np.ndarray, *, sheet_
                       settings: VirtualSensorSettings = VirtualSensorSettings()) -> np.ndarray:
     """Capacitance (..., rows, columns) in pF of the electrodes under a displacement (..., y, x) in mm of the electrode plane.
 
-    sheet_excess_mm: number or (rows, columns), by which the sheet over a taxel is thicker;  shift_mm: (x, y) of the object
+    sheet_excess_mm: number or (rows, columns), excess thickness of the sheet over a taxel;  shift_mm: (x, y) of the object
     """
     spacing = settings.electrode_spacing_mm
     extra = np.broadcast_to(sheet_excess_mm, (spec.taxels.rows, spec.taxels.columns))
@@ -210,17 +210,17 @@ def taxel_capacitance(spec: "SensorSpec", displacement_mm: np.ndarray, *, sheet_
 
 
 def _true_counts(spec, specimen, maps, force_n, history, rng, s):
-    """Counts (2 load steps, row, column) of one trial before the readout's faults: way up, then way down, each by rising force."""
+    """Counts (2 load steps, row, column) of one trial before the readout's errors: loading, then unloading, by rising force."""
     shift, force_error = s.placement_mm * rng.standard_normal(2), s.force_scatter * rng.standard_normal()
     maps = _at_force(np.asarray(maps), np.asarray(force_n, dtype=float), 1 + force_error)
-    felt = np.concatenate(felt_branches(maps, history, shares=s.relaxation, time_constants_s=s.relaxation_s))
+    delayed = np.concatenate(delayed_branches(maps, history, shares=s.relaxation, time_constants_s=s.relaxation_s))
     sheet = {"sheet_excess_mm": specimen.sheet_excess_mm, "settings": s}
-    rest = taxel_capacitance(spec, np.zeros(felt.shape[1:]), **sheet)
-    return s.counts_per_relative_change * (taxel_capacitance(spec, felt, shift_mm=shift, **sheet) / rest - 1)
+    rest = taxel_capacitance(spec, np.zeros(delayed.shape[1:]), **sheet)
+    return s.counts_per_relative_change * (taxel_capacitance(spec, delayed, shift_mm=shift, **sheet) / rest - 1)
 
 
 def _at_force(maps, force_n, factor):
-    """Maps (force, y, x) at `factor` times their forces (N): linear between load steps and from rest, and on beyond the last."""
+    """Maps (force, y, x) at `factor` times their forces (N): linear between load steps and from rest, extrapolated beyond."""
     if factor == 1:
         return maps
     force, maps = np.concatenate([[0.0], force_n]), np.concatenate([np.zeros((1, *maps.shape[1:])), maps])
@@ -231,7 +231,7 @@ def _at_force(maps, force_n, factor):
 
 
 def _read_out(true, specimen, draws, s, *, largest):
-    """Counts as the converter gives them, of true ones (trial, load step, row, column)."""
+    """Counts of the converter from true counts (trial, load step, row, column)."""
     taxels = true.shape[2:]
     steps = np.stack([rng.standard_normal((2, *taxels)) for rng in draws])[:, :, None]                # (trial, 2, 1, row, column)
     noise = s.noise_counts * np.stack([rng.standard_normal((true.shape[1], *taxels)) for rng in draws])
@@ -257,9 +257,9 @@ def amplified(counts: np.ndarray, *, gain: float | np.ndarray, offset: float | n
 
 def converted(counts: np.ndarray, *, noise: float | np.ndarray = 0.0, step: float = 1.0, largest: float = 2400.0,
               dead: bool | np.ndarray = False) -> np.ndarray:
-    """What the converter gives for counts (...): noise (...) added, rounded to `step` (0: not), within 0 and `largest`.
+    """Counts of the converter for counts (...): noise (...) added, rounded to `step` (0: not), within 0 and `largest`.
 
-    dead: (rows, columns) of bool, taxels that read zero whatever happens
+    dead: (rows, columns) of bool, taxels that always read zero
     """
     noisy = counts + noise
     rounded = step * np.round(noisy / step) if step > 0 else noisy

@@ -1,4 +1,4 @@
-"""What every kind of sensor has, and how its file is read; and what sensors of layers have besides: footprint, map, taxels."""
+"""Specifications of sensors: fields of all kinds, their files, and fields of sensors of layers (footprint, map, taxels)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,16 +16,16 @@ DEFAULT_KIND = "frusta"     # of a file that states none
 
 
 class ReadoutEntry(BaseModel):
-    """A readout of a sensor: its `kind`, and what that kind takes."""
+    """A readout of a sensor: its `kind`, and the keys of that kind."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
     kind: str = Field(description="one of the registered kinds: capacitance, points, strip")
 
 
 class Specification(FiniteSection):
-    """What a sensor of any kind has; each class states its `kind` as a literal.
+    """Fields of a sensor of any kind; each class states its `kind` as a literal.
 
-    readouts: what the sensor tells of a press, by names of choice; by default those of its kind
+    readouts: the sensor's readouts by names of choice; by default those of its kind
     """
 
     name: str
@@ -34,24 +34,24 @@ class Specification(FiniteSection):
 
     @property
     def stated_readouts(self) -> dict[str, ReadoutEntry]:
-        """The readouts of the file, or those that a sensor of this kind has without."""
+        """The readouts of the file, or else the default ones of the kind."""
         return self.readouts
 
     @property
     def has_layers(self) -> bool:
-        """Whether it is made of layers with maps of their surface."""
+        """Whether it consists of layers with maps of their surface."""
         return False
 
     @property
     def paths(self) -> list[Path]:
-        """All files that the sensor is read from beside the sensor's."""
+        """All files of the sensor besides its YAML file."""
         return []
 
     def need_layers(self) -> None:
         """Raise InputError if the sensor does not consist of layers."""
 
     def need_frusta(self, what: str, remedy: str) -> None:
-        """Refuse `what` with one sentence that ends in the remedy, where the sensor has no frusta."""
+        """Refuse `what`, in a sentence that ends in the remedy, where the sensor has no frusta."""
 
     def _found_in(self, folder: Path) -> None:
         """Store the folder of the sensor's file, to which its paths are relative."""
@@ -71,12 +71,12 @@ class Specification(FiniteSection):
     def from_dict(cls, values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Self:
         """Validate a mapping; the first fault becomes one sentence that names `where` and the field.
 
-        folder: that paths among the values are relative to
+        folder: to which paths among the values are relative
         """
         kind = cls.model_fields["kind"].annotation.__args__[0]     # type: ignore[union-attr]
         if values.get("kind", DEFAULT_KIND) != kind:
-            raise InputError(f"{where}, at 'kind': {values.get('kind', DEFAULT_KIND)!r} is not the kind that is needed here; give "
-                             f"a sensor of kind {kind}.")
+            raise InputError(f"{where}, at 'kind': {values.get('kind', DEFAULT_KIND)!r} is not the required kind; give a "
+                             f"sensor of kind {kind}.")
         try:
             spec = cls.model_validate(values)
         except ValidationError as error:
@@ -92,7 +92,7 @@ class Specification(FiniteSection):
 
 
 class BaseSpec(Specification):
-    """What sensors of layers have, with frusta below or none.
+    """Fields of sensors of layers, with or without frusta below.
 
     Frame: origin at the centre of the sensing surface, x and y along the sides, z outwards.
     """
@@ -112,12 +112,12 @@ class BaseSpec(Specification):
 
     @property
     def held_height_mm(self) -> float:
-        """Height of the part whose side faces a shell can hold: all layers, but not frusta."""
+        """Height of the layers, without frusta, whose side faces a shell can hold."""
         return self.thickness_mm
 
     @property
     def base_held(self) -> bool:
-        """Whether the board carries the sensor from below; else its sides alone do."""
+        """Whether the board carries the sensor from below; else its sides carry it."""
         return True
 
     @property
@@ -142,7 +142,7 @@ class BaseSpec(Specification):
 
     @property
     def support_facts(self) -> dict[str, Any]:
-        """What holds the sensor, and friction in the hyperelastic model, as attributes of a result."""
+        """Support of the sensor, and friction in the hyperelastic model, as attributes of a result."""
         raise NotImplementedError
 
     @property
@@ -168,11 +168,11 @@ class BaseSpec(Specification):
             self.need_frusta("the foundation model", "press with elastic or hyperelastic")
         if kind in ("elastic", "foundation") and not all(count % 2 for count in self.map_shape):
             raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
-                             "models ask for; write odd numbers.")
+                             "models need; write odd numbers.")
 
     @property
     def has_layers(self) -> bool:
-        """Whether it is made of layers with maps of their surface."""
+        """Whether it consists of layers with maps of their surface."""
         return True
 
     @property
@@ -203,7 +203,7 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
 
 
 def sentence(cls: type[Section], fault: Any, where: str) -> str:
-    """What is wrong with a field of a file, and what to do, from pydantic's first fault."""
+    """The fault of a field of a file and its remedy, from pydantic's first fault."""
     field = ".".join(str(part) for part in fault["loc"])
     if fault["type"] == "extra_forbidden":
         *parents, last = fault["loc"]

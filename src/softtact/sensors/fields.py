@@ -1,4 +1,4 @@
-"""What sensor files are made of: values, plain or stated with whether they are assumed and why, and the blocks that kinds share."""
+"""Parts of sensor files: values, plain or with the reason for an assumption, and the blocks that kinds share."""
 
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def plain_value(field: Any) -> Any:
-    """Accept `{value, assumed, reason}` wherever a plain value stands."""
+    """Accept `{value, assumed, reason}` in place of a plain value."""
     if isinstance(field, dict) and "value" in field:
         extra = set(field) - {"value", "assumed", "reason"}
         if extra:
@@ -29,7 +29,7 @@ class FiniteSection(Section):
 
 
 class Stated(FiniteSection, Generic[T]):
-    """A value with whether it is assumed, and why."""
+    """A value, whether it is assumed, and the reason."""
 
     value: T
     assumed: bool = False
@@ -37,7 +37,7 @@ class Stated(FiniteSection, Generic[T]):
 
 
 def _or_stated(kind: Any) -> BeforeValidator:
-    """What lets a `kind` of value stand as a `Stated` one in the file."""
+    """A validator that allows a `Stated` value in place of a plain one of a `kind`."""
     return BeforeValidator(plain_value, json_schema_input_type=kind | Stated[kind])
 
 
@@ -61,25 +61,25 @@ class ElasticLayer(FiniteSection):
     poisson: Annotated[float, Field(gt=-1.0, lt=0.5)]
 
 
-# --- what holds a sensor's rim ---
+# --- support of a sensor's rim ---
 #
 # A rigid shell around the sensor, up to a stated height, which also carries an object wider than the sensor:
-#     edge: {held: sides}                       the shell ends flush with the sensing surface: all of the side faces are held
+#     edge: {held: sides}                       the shell ends flush with the sensing surface: the whole side faces are held
 #     edge: {held: {sides_below_mm: 1.5}}       the shell ends 1.5 mm below it: side faces are held from there down, free above
 #     edge: {held: free}                        no shell: side faces are free
 # The shell is rigid and as wide as `shell_width_mm`. An object that reaches over it comes down until it meets the shell's top,
-# which carries whatever force is then added. So with `held: sides` a flat object wider than the sensor rests on the shell at first
+# which carries all further force. So with `held: sides` a flat object wider than the sensor rests on the shell at first
 # touch.
 
 
 class SidesBelow(FiniteSection):
-    """A shell that holds the side faces from so far below the sensing surface on."""
+    """A shell that holds the side faces from a depth below the sensing surface on."""
 
     sides_below_mm: Length
 
 
 def _held(value: Any) -> Any:
-    """Refuse what is none of the three in one sentence, where a union's own errors would name each of its members."""
+    """Refuse other values in one sentence; the errors of a pydantic union would name each of its members."""
     if isinstance(value, SidesBelow) or value in ("sides", "free"):
         return value
     if not (isinstance(value, dict) and set(value) == {"sides_below_mm"}):
@@ -91,14 +91,14 @@ def _held(value: Any) -> Any:
 
 
 class Edge(FiniteSection):
-    """What holds the rim: `held` is sides, free or {sides_below_mm: h}; each may also be given in place of the whole block."""
+    """Support of the rim: `held` is sides, free or {sides_below_mm: h}; each may also be given in place of the whole block."""
 
     held: Annotated[Literal["sides", "free"] | SidesBelow, BeforeValidator(_held)] = "sides"
     shell_width_mm: Length = 2.0
 
     @property
     def held_below_mm(self) -> float:
-        """Depth below the sensing surface from which side faces are held, which is that of the shell's top; infinite without."""
+        """Depth below the sensing surface from which side faces are held, the depth of the shell's top; infinite without shell."""
         if isinstance(self.held, SidesBelow):
             return self.held.sides_below_mm
         return 0.0 if self.held == "sides" else np.inf
@@ -123,7 +123,7 @@ def _short(value: Any) -> Any:
 EdgeField = Annotated[Edge, BeforeValidator(_short)]
 
 
-# --- what `softtact calibrate` found of one sensor ---
+# --- results of `softtact calibrate` for one sensor ---
 
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
@@ -131,7 +131,7 @@ Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 class CalibrationBlock(FiniteSection):
     """counts = gain x counts_per_relative_change x dC/C0 + zero_counts, of each taxel; dC/C0 with the electrodes' edges and
-    neighbours as the virtual sensor has them.
+    neighbours as in the virtual sensor.
     """
 
     gain: tuple[tuple[PositiveFloat, ...], ...] = Field(description="(rows, columns), as a share of the common one")
@@ -146,7 +146,7 @@ class CalibrationBlock(FiniteSection):
     standard_deviations: dict[str, float] = {}
 
     def fault(self, rows: int, columns: int) -> str | None:
-        """What does not fit a sensor of so many rows and columns of taxels, or each other; None where all does."""
+        """The first fault for a sensor with `rows` and `columns` of taxels; None where all fits."""
         for name in ("gain", "zero_counts"):
             values = getattr(self, name)
             if len(values) != rows or any(len(row) != columns for row in values):

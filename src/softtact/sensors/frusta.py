@@ -8,7 +8,7 @@ from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec
 from softtact.sensors.fields import Coefficient, FiniteSection, Flag, Length
 
-# How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
+# Frustum orientations for the two printed diameters: the narrow end as the tip, or the wide one, as the paper's text has it.
 ORIENTATIONS = ("default", "as_printed")
 
 
@@ -53,10 +53,10 @@ class SensorSpec(BaseSpec):
     tips_bonded: Flag = True
     friction: Friction = Friction()
 
-    def with_frustum_orientation(self, reading: str) -> "SensorSpec":
-        """The same sensor with the `default` reading of its frustum's diameters, the narrow end as tip, or `as_printed`."""
+    def with_frustum_orientation(self, orientation: str) -> "SensorSpec":
+        """The same sensor with the frustum orientation `default`, the narrow end as tip, or `as_printed`."""
         narrow, wide = sorted((self.dielectric.frusta.tip_diameter_mm, self.dielectric.frusta.root_diameter_mm))
-        tip, root = {"default": (narrow, wide), "as_printed": (wide, narrow)}[reading]
+        tip, root = {"default": (narrow, wide), "as_printed": (wide, narrow)}[orientation]
         frusta = self.dielectric.frusta.model_copy(update={"tip_diameter_mm": tip, "root_diameter_mm": root})
         return self.model_copy(update={"dielectric": self.dielectric.model_copy(update={"frusta": frusta})})
 
@@ -92,11 +92,11 @@ class SensorSpec(BaseSpec):
                 "tips_bonded": int(self.tips_bonded)}
 
     def check_for(self, kind: str) -> None:
-        """Refuse a map or a lattice that a model of this kind (elastic, foundation, hyperelastic) cannot take by its quarters."""
+        """Refuse a map or a lattice that a model of this kind (elastic, foundation, hyperelastic) cannot divide into quarters."""
         super().check_for(kind)
         if kind == "foundation" and any(count % 2 for count in self.frusta_counts):
             raise InputError(f"{self.name}: its lattice of {self.frusta_counts[0]} x {self.frusta_counts[1]} frusta has a row in "
-                             "the middle; the foundation model wants even numbers; change the pitch or the footprint a little.")
+                             "the middle; the foundation model needs even numbers; change the pitch or the footprint a little.")
 
     @property
     def held_height_mm(self) -> float:

@@ -1,4 +1,4 @@
-"""Sensors of `kind: layers`: one or two plain layers without frusta, on the board or held at their sides alone."""
+"""Sensors of `kind: layers`: one or two plain layers without frusta, on the board or held only at their sides."""
 
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -8,11 +8,11 @@ from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec
 from softtact.sensors.fields import Coefficient, FiniteSection, Length
 
-_ELEMENTS = 4     # through the thickness that the default size of elements in plan is taken from
+_ELEMENTS = 4     # through the thickness, for the default size of elements in plan
 
 
 class PlainLayer(FiniteSection):
-    """A layer as thick everywhere; `relative_permittivity` counts in the lowest, the dielectric."""
+    """A layer of constant thickness; `relative_permittivity` is used for the lowest, the dielectric."""
 
     material: str
     thickness_mm: Length
@@ -61,7 +61,7 @@ class LayersSpec(BaseSpec):
 
     @property
     def base_held(self) -> bool:
-        """Whether the board carries the sensor from below; else its sides alone do."""
+        """Whether the board carries the sensor from below; else its sides carry it."""
         return self.support == "base"
 
     @property
@@ -76,7 +76,7 @@ class LayersSpec(BaseSpec):
 
     @property
     def parts_in_words(self) -> str:
-        """How many layers there are, and what holds them."""
+        """Number of layers, and their support."""
         return f"{len(self.layers)} plain layer{'s' * (len(self.layers) > 1)} ({self.support})"
 
     @property
@@ -85,5 +85,5 @@ class LayersSpec(BaseSpec):
         return {"friction_object": self.friction.object, "support": self.support}
 
     def need_frusta(self, what: str, remedy: str) -> NoReturn:
-        """Refuse `what` with one sentence that ends in the remedy."""
+        """Refuse `what` in a sentence that ends in the remedy."""
         raise InputError(f"{self.name} has no frusta, which {what} needs; {remedy}.")

@@ -1,4 +1,4 @@
-"""Sensors of `kind: solid`: any soft body of elements, such as a fingertip's dome, with what it is made of and what holds it.
+"""Sensors of `kind: solid`: any soft body of elements, such as a fingertip's dome, with its materials and supports.
 
     name: dome
     kind: solid
@@ -71,16 +71,16 @@ class SolidSpec(Specification):
     held: Annotated[dict[str, str], Field(min_length=1)]
     contact: ContactFace
     readings: ReadingPlaces | None = Field(None, description="short for a readout of the name and the kind points")
-    _folder: Path = PrivateAttr(Path())     # of the sensor's file, which its paths are relative to
+    _folder: Path = PrivateAttr(Path())     # of the sensor's file, to which its paths are relative
 
     @property
     def mesh_path(self) -> Path:
-        """The mesh file as seen from here."""
+        """Path of the mesh file, relative to the working folder."""
         return self._folder / self.mesh.file
 
     @property
     def paths(self) -> list[Path]:
-        """All files that the sensor is read from beside the sensor's."""
+        """All files of the sensor besides its YAML file."""
         return [self.mesh_path, *(self._folder / region.card for region in self.regions.values() if region.card)]
 
     @property
@@ -94,12 +94,12 @@ class SolidSpec(Specification):
         self._folder = folder
 
     def need_layers(self) -> NoReturn:
-        """Refuse what takes sensors of layers alone."""
+        """Refuse uses that need a sensor of layers."""
         raise InputError(f"{self.name}, a sensor of kind solid: a solid has no layers and no taxels, which are needed here; press "
                          "it with `softtact press` or `softtact.load_sensor`, or give a sensor of kind frusta or layers.")
 
     def law_of(self, name: str) -> Law:
-        """The law of a region. Raises InputError where what it is made from does not give one."""
+        """The law of a region. Raises InputError where its material, card or constants give no law."""
         region = self.regions[name]
         if region.card:
             return law_from_card(load_card(self._folder / region.card), region.law)
@@ -119,12 +119,12 @@ class SolidSpec(Specification):
             if fault := _region_fault(region):
                 raise InputError(f"{where}, at 'regions.{name}': {fault}")
         if self.readings is not None and "points" in self.readouts:
-            raise InputError(f"{where}, at 'readings': it is short for a readout of the name 'points', which stands under "
-                             "'readouts', too; leave one of them out.")
+            raise InputError(f"{where}, at 'readings': it means a readout of the name 'points', which is also under "
+                             "'readouts'; leave one of them out.")
 
 
 def _region_fault(region: Region) -> str | None:
-    """What is wrong with what a region's law is made from, and what to do; None where nothing is."""
+    """The fault in the sources of a region's law, and its remedy; None without fault."""
     given = [name for name in _SOURCES if getattr(region, name) is not None]
     if not given:
         return "it has no law; give 'material', 'card', or 'law' with 'parameters'."
@@ -134,5 +134,5 @@ def _region_fault(region: Region) -> str | None:
     if plain and region.parameters is None:
         return f"the law {region.law!r} has no parameters; give its constants in MPa."
     if not plain and (region.parameters is not None or region.bulk_over_shear is not None):
-        return f"'parameters' and 'bulk_over_shear' are of a law by itself; leave them out, or leave {given[0]!r} out."
+        return f"'parameters' and 'bulk_over_shear' belong to 'law'; leave them out, or leave {given[0]!r} out."
     return None

@@ -1,9 +1,9 @@
-"""The sensor as its YAML file describes it, by its `kind`: sizes in mm, layers, frusta, taxels. No mechanics.
+"""The contents of a sensor's YAML file, by its `kind`: sizes in mm, layers, frusta, taxels. No mechanics.
 
-    frusta   `SensorSpec`: a cover on a dielectric with frusta; a file without `kind` is of this one
+    frusta   `SensorSpec`: a cover on a dielectric with frusta; the kind of a file without `kind`
     layers   `LayersSpec`: one or two plain layers
     solid    `SolidSpec`: any body of elements
-A new kind is a file with its class, a line in `KINDS`, and one in `press.kinds.KINDS`, which says how it is loaded and pressed.
+To add a kind, add a file with its class, a line to `KINDS`, and one to `press.kinds.KINDS` for loading and pressing it.
 """
 
 from functools import reduce
@@ -32,7 +32,7 @@ def read_any_spec(path: str | Path) -> Specification:
 
 
 def any_spec(values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Specification:
-    """The specification of a mapping, of the class that its `kind` names; `folder`: that its paths are relative to."""
+    """The specification of a mapping, of the class that its `kind` names; `folder`: to which its paths are relative."""
     kind = values.get("kind", DEFAULT_KIND)
     if kind not in KINDS:
         *names, last = KINDS

@@ -1,4 +1,4 @@
-"""What every hyperelastic law offers: energy, stress and tangent at points, and the curves of simple tests.
+"""The interface of hyperelastic laws: energy, stress and tangent at points, and the curves of simple tests.
 
 Symbols: C right Cauchy-Green tensor, J = sqrt(det C), l1 l2 l3 principal stretches, lb = J^(-1/3) l their isochoric
 parts, psi(lb) isochoric energy per reference volume (MPa), K bulk modulus (MPa).
@@ -25,10 +25,10 @@ TEST_PATHS = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A material constant: its name, its unit ("MPa" or "1") and where a fit searches it.
+    """A material constant: its name, its unit ("MPa" or "1") and the bounds of a fit.
 
-    `low` and `high` bound the fit; for unit "MPa" they are multiples of the curves' stiffness. psi must be linear in
-    its constants of unit "MPa": the fit solves them directly.
+    `low` and `high`, for unit "MPa", are multiples of the curves' stiffness. psi must be linear in its constants of unit
+    "MPa": the fit solves for them directly.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Law:
     """A law psi of the isochoric stretches, with an energy U(J) of the volume.
 
     volumetric: U, a `VolumetricFunction`
-    stretch_window: lowest and highest principal stretch of the data it was fitted to; None where that is not known
+    stretch_window: lowest and highest principal stretch of the fitted data; None where not known
     """
 
     stretch_window: tuple | None = None
@@ -70,7 +70,7 @@ class Law:
 
     @classmethod
     def in_order(cls, parameters: dict[str, float]) -> dict[str, float]:
-        """The same constants in their usual order, where terms can be exchanged."""
+        """The same constants, with exchangeable terms in their usual order."""
         return parameters
 
     @classmethod
@@ -97,7 +97,7 @@ class Law:
 
     @property
     def projected_modulus(self) -> float:
-        """Modulus (MPa) of U(J): K, or 0 of a law whose energy does not divide into shape and volume."""
+        """Modulus (MPa) of U(J): K, or 0 for a law whose energy does not divide into an isochoric and a volumetric part."""
         return self.bulk_modulus
 
     @property
@@ -125,7 +125,7 @@ class Law:
     def nominal_stress(self, mode: str, stretch: float | np.ndarray) -> np.ndarray:
         """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test.
 
-        A law with a `stretch_window` warns (`ExtrapolationWarning`) of stretches outside of it.
+        A law with a `stretch_window` warns (`ExtrapolationWarning`) of stretches outside it.
         """
         stretches = principal_stretches(mode, stretch)
         self._warn_outside(stretches)
@@ -138,10 +138,10 @@ class Law:
         low, high = self.stretch_window
         if stretches.min() < low * (1 - 1e-9) or stretches.max() > high * (1 + 1e-9):
             warnings.warn(f"Law {self.name} is used at principal stretches {stretches.min():.3g} to {stretches.max():.3g}; its card"
-                          f" rests on data from {low:.3g} to {high:.3g}.", ExtrapolationWarning, stacklevel=3)
+                          f" is based on data from {low:.3g} to {high:.3g}.", ExtrapolationWarning, stacklevel=3)
 
     def uniaxial_compressible(self, stretch: float | np.ndarray) -> np.ndarray:
-        """Nominal stress (MPa) of the uniaxial test with U: the lateral stress is solved to zero."""
+        """Nominal stress (MPa) of the uniaxial test with U, for zero lateral stress."""
         axial = np.atleast_1d(np.asarray(stretch, float))
         stress = np.array([self._axial_stress(value) for value in axial])
         return stress.reshape(np.shape(stretch))

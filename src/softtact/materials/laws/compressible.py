@@ -1,12 +1,12 @@
-"""Laws of compressible materials: an energy of the whole principal stretches that does not divide into shape and volume.
+"""Laws of compressible materials: an energy of the principal stretches without an isochoric and a volumetric part.
 
-`isochoric` of such a law gives the whole response, and `projected_modulus` is 0: elements project no part of it, for these
+`isochoric` of such a law gives the whole response, and `projected_modulus` is 0: elements project no part of it, as these
 materials do not lock.
 
 Symbols: l_a principal stretches, c_a = l_a^2, J = l_1 l_2 l_3, t_a = l_a dpsi/dl_a Kirchhoff stress, h_ab = dt_a/dln l_b
 Stress:  S = sum_a t_a/c_a N_aN_a
 Tangent: D = sum_ab (h_ab - 2 delta_ab t_a)/(c_a c_b) N_aN_a x N_bN_b + sum_a<b Q_ab W_ab x W_ab,
-         Q_ab = (S_a - S_b)/(c_a - c_b) = (c_b (t_a - t_b)/(c_a - c_b) - t_b)/(c_a c_b), as `stretches` takes it.
+         Q_ab = (S_a - S_b)/(c_a - c_b) = (c_b (t_a - t_b)/(c_a - c_b) - t_b)/(c_a c_b), as in `stretches`.
 Here     psi = sum_k 2 mu_k/alpha_k^2 (l_1^alpha_k + l_2^alpha_k + l_3^alpha_k - 3 + (J^(-alpha_k beta_k) - 1)/beta_k), so that
          t_a = sum_k 2 mu_k/alpha_k (l_a^alpha_k - J^(-alpha_k beta_k))  and
          h_ab = sum_k 2 mu_k (delta_ab l_a^alpha_k + beta_k J^(-alpha_k beta_k)).
@@ -20,16 +20,16 @@ from scipy.optimize import brentq
 
 from softtact.errors import InputError
 from softtact.materials.laws.base import TEST_PATHS, IsochoricResponse, Law
-from softtact.materials.laws.stretches import dyads, eigen, quotient, sum_dyads
+from softtact.materials.laws.stretches import dyads, eigen, quotient, response, sum_dyads
 
 
 class CompressibleLaw(Law):
     """A law of terms (mu_k, alpha_k, beta_k); a class gives them by `terms`."""
 
     def __init__(self, parameters: dict[str, float], **volume: object) -> None:
-        """parameters {constant: MPa or 1};  volume: not used, the constants say all."""
-        own = {constant.name: float(parameters[constant.name]) for constant in self.constants}
-        self._mu, self._alpha, self._beta = (np.array(values, dtype=float) for values in zip(*self.terms(own), strict=True))
+        """parameters {constant: MPa or 1};  volume: not used, the constants determine it."""
+        values = {constant.name: float(parameters[constant.name]) for constant in self.constants}
+        self._mu, self._alpha, self._beta = (np.array(column, dtype=float) for column in zip(*self.terms(values), strict=True))
         super().__init__(parameters, bulk_modulus=float((2 * self._mu * (1 / 3 + self._beta)).sum()))
 
     @classmethod
@@ -47,14 +47,10 @@ class CompressibleLaw(Law):
 
     def isochoric(self, C6: np.ndarray, *, tangent: bool = True) -> IsochoricResponse:
         """`IsochoricResponse` of the whole energy for C6 (n, 6)."""
-        C6 = np.ascontiguousarray(C6, dtype=float)
-        energy, stress = np.empty(len(C6)), np.empty((len(C6), 6))
-        moduli = np.empty((len(C6) if tangent else 0, 6, 6))
-        _response(C6, self._mu, self._alpha, self._beta, energy, stress, moduli)
-        return IsochoricResponse(energy, stress, moduli if tangent else None)
+        return response(_response, C6, self._mu, self._alpha, self._beta, tangent=tangent)
 
     def principal_stress(self, stretches: np.ndarray) -> np.ndarray:
-        """Kirchhoff stress t_a (..., 3) in MPa at whole principal stretches (..., 3)."""
+        """Kirchhoff stress t_a (..., 3) in MPa at principal stretches (..., 3), not isochoric ones."""
         logs = np.log(stretches)
         volume = np.expm1(-logs.sum(axis=-1)[..., None] * self._alpha * self._beta)
         return (np.expm1(logs[..., None] * self._alpha) - volume[..., None, :]) @ (2 * self._mu / self._alpha)
@@ -68,7 +64,7 @@ class CompressibleLaw(Law):
         return self.principal_stress(stretches)[..., 0] / np.asarray(stretch, float)
 
     def lateral_stretch(self, mode: str, stretch: float | np.ndarray) -> np.ndarray:
-        """Stretch across, along the free direction, in the same tests."""
+        """Stretch along the free direction in the same tests."""
         return np.array([self._stretches(mode, value)[2] for value in np.ravel(stretch)]).reshape(np.shape(stretch))
 
     def _stretches(self, mode, stretch):
@@ -114,8 +110,8 @@ def _response(C6, mu, alpha, beta, energy, stress, tangent):
             continue
         for a in range(3):
             for b in range(3):
-                own = h[a] - 2 * t[a] if a == b else 0.0
-                D[a, b] = (own + coupling) / (c[a] * c[b])
+                diagonal = h[a] - 2 * t[a] if a == b else 0.0
+                D[a, b] = (diagonal + coupling) / (c[a] * c[b])
         Q[0] = quotient(c, c, t, mu, alpha, 0, 1)
         Q[1] = quotient(c, c, t, mu, alpha, 1, 2)
         Q[2] = quotient(c, c, t, mu, alpha, 2, 0)

@@ -16,8 +16,8 @@ _NU = (-0.99, 0.499)
 
 
 def _constants(terms):
-    bounds = {"mu": ("MPa", -5.0, 5.0), "alpha": ("1", -25.0, 25.0), "nu": ("1", *_NU)}
-    return tuple(Parameter(f"{name}{k}", *own) for k in terms for name, own in bounds.items())
+    of_term = {"mu": ("MPa", -5.0, 5.0), "alpha": ("1", -25.0, 25.0), "nu": ("1", *_NU)}
+    return tuple(Parameter(f"{name}{k}", *bounds) for k in terms for name, bounds in of_term.items())
 
 
 class Hyperfoam1(CompressibleLaw):

@@ -20,7 +20,7 @@ class Gent(InvariantLaw):
 
     @classmethod
     def lowest(cls, stretches: np.ndarray) -> dict[str, float]:
-        """The search keeps jm above the largest x of the points (n, 3), where psi exists; see `Law.lowest`."""
+        """jm above the largest x of the points (n, 3), so that psi exists there; see `Law.lowest`."""
         return {"jm": 1.001 * float((stretches**2).sum(axis=1).max() - 3) + 1e-6}
 
     def derivatives(self, i1: np.ndarray, i2: np.ndarray) -> Derivatives:

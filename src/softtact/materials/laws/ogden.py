@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from softtact.materials.laws.base import IsochoricResponse, Law, Parameter
-from softtact.materials.laws.stretches import power_sum_response
+from softtact.materials.laws.stretches import power_sum_response, response
 
 
 def _constants(terms):
@@ -28,7 +28,7 @@ class Ogden1(Law):
     def __init__(self, parameters: dict[str, float], **volume: Any) -> None:
         super().__init__(parameters, **volume)
         self._mu, self._alpha = np.array(list(self.parameters.values())).reshape(-1, 2).T.copy()
-        self._alpha[self._alpha == 0] = 1e-9  # a search may touch 0, whose limit is finite; `make_law` refuses it
+        self._alpha[self._alpha == 0] = 1e-9  # a search may reach 0, whose limit is finite; `make_law` refuses it
 
     @classmethod
     def in_order(cls, parameters: dict[str, float]) -> dict[str, float]:
@@ -42,11 +42,7 @@ class Ogden1(Law):
         return float(self._mu.sum())
 
     def isochoric(self, C6: np.ndarray, *, tangent: bool = True) -> IsochoricResponse:
-        C6 = np.ascontiguousarray(C6, dtype=float)
-        energy, stress = np.empty(len(C6)), np.empty((len(C6), 6))
-        moduli = np.empty((len(C6) if tangent else 0, 6, 6))
-        power_sum_response(C6, self._mu, self._alpha, energy, stress, moduli)
-        return IsochoricResponse(energy, stress, moduli if tangent else None)
+        return response(power_sum_response, C6, self._mu, self._alpha, tangent=tangent)
 
     def principal_stress(self, stretches: np.ndarray) -> np.ndarray:
         excess = np.expm1(np.log(stretches)[..., None] * self._alpha)  # lb^alpha - 1: exact near alpha = 0

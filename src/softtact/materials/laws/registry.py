@@ -1,4 +1,4 @@
-"""All laws by name. A new law is one file here beside, and its class in `LAWS`, or in `FOAM_LAWS` where it is one of foams."""
+"""All laws by name. To add a law, add a file to this folder and its class to `LAWS`, or to `FOAM_LAWS` for a foam."""
 
 import math
 
@@ -15,7 +15,7 @@ from softtact.materials.laws.reduced_polynomial2 import ReducedPolynomial2
 from softtact.materials.laws.volumetric import VOLUMETRIC_FUNCTIONS
 from softtact.materials.laws.yeoh import Yeoh
 
-_SAME = 1e-3     # of the bulk modulus: what is nearer is the same number, rounded in a file
+_SAME = 1e-3     # of the bulk modulus: a smaller difference comes from rounding in a file
 LAWS: dict[str, type[Law]] = {
     law.name: law for law in (NeoHooke, MooneyRivlin, Yeoh, ReducedPolynomial2, ArrudaBoyce, Gent, Ogden1, Ogden2, Ogden3)
 }
@@ -25,10 +25,10 @@ FOAM_LAWS: dict[str, type[Law]] = {law.name: law for law in (Hyperfoam1, Hyperfo
 
 
 def law_class(name: str, *, fitted: bool = False) -> type[Law]:
-    """The class of a law; an unknown name is refused, and one of a foam where the law is to be `fitted`."""
+    """The class of a law. Unknown names are refused, and laws of foams where the law is to be `fitted`."""
     if fitted and name in FOAM_LAWS:
-        raise InputError(f"Law {name!r} is one of compressible foams, and a fit takes its curves for those of an incompressible "
-                         "material; fit it elsewhere, and give its constants in a card.")
+        raise InputError(f"Law {name!r} describes compressible foams, but a fit assumes curves of an incompressible material; fit "
+                         "it elsewhere, and give its constants in a card.")
     if name not in LAWS | FOAM_LAWS:
         raise InputError(f"Law {name!r} is unknown; use one of {', '.join(LAWS | ({} if fitted else FOAM_LAWS))}.")
     return (LAWS | FOAM_LAWS)[name]
@@ -39,7 +39,7 @@ def make_law(name: str, parameters: dict[str, float], *, bulk_modulus: float | N
     """A law with its constants (MPa, 1). The bulk modulus (MPa) is `bulk_modulus`, or `bulk_over_shear` * mu0.
 
     volumetric: name of its U(J) in VOLUMETRIC_FUNCTIONS
-    A foam's law has the bulk modulus that its constants give; another one is refused.
+    The constants of a foam's law determine its bulk modulus; another one is refused.
     """
     kind = law_class(name)
     _check(kind, parameters)

@@ -12,11 +12,22 @@ Reference: Ogden, Non-linear Elastic Deformations (1984), section 6.1; Holzapfel
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numba import njit
 
+from softtact.materials.laws.base import IsochoricResponse
 from softtact.materials.laws.invariants import COLUMN, ROW
+
+
+def response(kernel: Callable[..., None], C6: np.ndarray, *constants: np.ndarray, tangent: bool) -> IsochoricResponse:
+    """The response at C6 (n, 6) by a kernel that fills energy (n,), stress (n, 6) and, unless it is empty, tangent (n, 6, 6)."""
+    C6 = np.ascontiguousarray(C6, dtype=float)
+    energy, stress = np.empty(len(C6)), np.empty((len(C6), 6))
+    moduli = np.empty((len(C6) if tangent else 0, 6, 6))
+    kernel(C6, *constants, energy, stress, moduli)
+    return IsochoricResponse(energy, stress, moduli if tangent else None)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -84,8 +95,8 @@ def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy
         total = h[0] + h[1] + h[2]
         for a in range(3):
             for b in range(3):
-                own = h[a] - 2 * dev[a] if a == b else 0.0
-                D[a, b] = (own - (h[a] + h[b]) / 3 + total / 9) / (c[a] * c[b])
+                diagonal = h[a] - 2 * dev[a] if a == b else 0.0
+                D[a, b] = (diagonal - (h[a] + h[b]) / 3 + total / 9) / (c[a] * c[b])
         quotients[0] = quotient(c, cb, dev, mu, alpha, 0, 1)
         quotients[1] = quotient(c, cb, dev, mu, alpha, 1, 2)
         quotients[2] = quotient(c, cb, dev, mu, alpha, 2, 0)
@@ -148,7 +159,7 @@ def dyads(V: np.ndarray, N: np.ndarray, W: np.ndarray) -> None:
 
 
 def stretch_range(C6: np.ndarray, *, isochoric: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest principal stretch (n,), of the isochoric ones or the whole ones, at points given by C6 (n, 6).
+    """Smallest and largest principal stretch (n,), isochoric or not, at points with C6 (n, 6).
 
     Eigenvalues of a symmetric 3 x 3 matrix in closed form (Smith, Comm. ACM 4 (1961) 168).
     """

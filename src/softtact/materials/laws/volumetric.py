@@ -1,8 +1,8 @@
-"""Volumetric functions: the energy U(J) of a change of volume, which a law has beside its isochoric energy psi.
+"""Volumetric functions: the energy U(J) of a change of volume, which a law has besides its isochoric energy psi.
 
 Symbols: J volume ratio, d = J - 1 change of volume, K bulk modulus (MPa), U energy per reference volume (MPa).
-Every function has U(1) = U'(1) = 0 and U''(1) = K, and is proportional to K. All are written in d, which keeps its digits
-near J = 1. A further function is a class here and a line in VOLUMETRIC_FUNCTIONS; elements take it as it is.
+Every function has U(1) = U'(1) = 0 and U''(1) = K, and is proportional to K. All are written in d, which has no cancellation
+near J = 1. To add a function, add a class here and its name to VOLUMETRIC_FUNCTIONS; elements need no change.
 
 quadratic    U = K/2 d^2,                    U' = K d,              U'' = K               (Sussman and Bathe 1987; Abaqus, D = 2/K)
 logarithmic  U = K/4 (J^2 - 1 - 2 ln J),     U' = K/2 (J - 1/J),    U'' = K/2 (1 + 1/J^2)  (Simo and Taylor 1982; infinite at J = 0)
@@ -19,7 +19,7 @@ import numpy as np
 class VolumetricFunction:
     """U(J) of a bulk modulus in MPa.
 
-    name: by which `make_law` finds it;  linear: U' is K d, so that U'' is K for every J;  least_change: U exists for d above this
+    name: as given to `make_law`;  linear: U' is K d, so that U'' is K for every J;  least_change: U exists for d above this
     """
 
     bulk_modulus: float

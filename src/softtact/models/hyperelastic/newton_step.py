@@ -192,7 +192,7 @@ class DissectedContact:
         """The Schur complement with points of a stiffness (p,): upper triangle of k displacements, object's column and corner."""
         if self._points is not points:
             self._points, self._rows = points, points.rows @ self._frames.movements(self.solver.unknowns)
-        left = self.solver.left
+        left = self.solver.schur_complement
         matrix, border = left[:-1, :-1].copy(), left[:-1, -1] + self._rows.T @ (slope * points.indentation_increment)
         _add_points(matrix, self._rows.indptr, self._rows.indices, self._rows.data, slope)
         return matrix, border, float(left[-1, -1]) + slope @ points.indentation_increment**2
