@@ -252,9 +252,9 @@ class _Deck:
         lines = self.writer.step(step.name, _INCREMENTS, first=first)
         lines += [f"HELD_{axis + 1}, {axis + 1}, {axis + 1}" for axis in range(3) if len(self._held(axis))]
         plane = self.body.mesh.geometry != "solid"
-        for (frame, axis), value in step.displacements.items():
+        for (frame, axis), displacement in step.displacements.items():
             if not (plane and axis == 2):
-                lines += [f"{self.reference[frame]}, {axis + 1}, {axis + 1}, {keywords.number(value)}"]
+                lines += [f"{self.reference[frame]}, {axis + 1}, {axis + 1}, {keywords.number(displacement)}"]
         if self.writer.facets_are_rigid:
             lines += [f"{self.reference[k]}, 4, 6" for k, frame in enumerate(self.body.frames) if frame.nodes.min() >= self.soft]
         if step.loads:
