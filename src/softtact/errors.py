@@ -42,6 +42,10 @@ class ShellWarning(UserWarning):
     """An object rests on the shell around a pad, and the shell carries any further force."""
 
 
+class NarrowPartWarning(UserWarning):
+    """An object has parts that are narrower than the distance of a model's points."""
+
+
 class FrameWarning(UserWarning):
     """A camera frame may not meet the assumptions of the detection of discs."""
 

@@ -23,7 +23,7 @@ class HeightField:
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         area = np.linalg.norm(cross, axis=1)
         facing_down = cross[:, 2] < -1e-9 * np.maximum(area, 1e-300)   # walls and upper sides cannot be touched
-        self.triangles = triangles[facing_down]
+        self.triangles, self._corners = triangles[facing_down], np.asarray(mesh.faces)[facing_down]
         self.normals = cross[facing_down] / area[facing_down, None]
         self.lowest_mm = float(triangles[..., 2].min())
         low, high = self._plan_bounds()
@@ -68,6 +68,20 @@ class HeightField:
         over = ((corners[:, 0] >= x_mm[0]) & (corners[:, 0] <= x_mm[-1]) & (corners[:, 1] >= y_mm[0]) & (corners[:, 1] <= y_mm[-1]))
         height, _ = self(*(line.ravel() for line in np.meshgrid(x_mm, y_mm)))
         return float(min(corners[over, 2].min(initial=NO_CONTACT_MM), height.min()))
+
+    def along_edges(self, below_mm: float, spacing_mm: float) -> np.ndarray:
+        """Points (k, 3) on the edges of all facets below a height, from end to end in steps of at most `spacing_mm` in x and y."""
+        near = self.triangles[..., 2].min(axis=1) < below_mm
+        ends = np.stack([self._corners[near], np.roll(self._corners[near], -1, axis=1)], axis=2).reshape(-1, 2)
+        key = ends.min(axis=1) * (self._corners.max(initial=0) + 1) + ends.max(axis=1)
+        _, once = np.unique(key, return_index=True)      # two facets share an edge
+        facet, side = np.divmod(once, 3)
+        start, end = self.triangles[near][facet, side], self.triangles[near][facet, (side + 1) % 3]
+        parts = np.maximum(1, np.ceil(np.linalg.norm((end - start)[:, :2], axis=1) / spacing_mm).astype(int))
+        edge = np.repeat(np.arange(len(parts)), parts + 1)
+        share = (np.arange(len(edge)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)) / parts[edge]
+        points = start[edge] + share[:, None] * (end - start)[edge]
+        return points[points[:, 2] < below_mm]
 
     def lowest_over(self, low: np.ndarray, high: np.ndarray) -> float:
         """Height (mm) of the underside's lowest point over a rectangle with corners low (2,) and high (2,), exact to the triangles;

@@ -70,6 +70,17 @@ class ObjectPoints:
         gap[self.edge[place]], slope[self.edge[place]], window[place] = lower.gap[here], lower.slope[here], lower.window[here]
         return replace(self, gap=gap, slope=slope, window=window, beneath=None)
 
+    def with_nodes(self, nodes: np.ndarray, gap: np.ndarray) -> "ObjectPoints":
+        """The points with others (k,), level and away from edges, of these gaps (k,) in place of those of the same nodes."""
+        stays, kept = ~np.isin(self.nodes, nodes), ~np.isin(self.nodes[self.edge], nodes)
+        order = np.argsort(np.concatenate([self.nodes[stays], nodes]))
+        place = np.argsort(order)[np.cumsum(stays) - 1]      # of those that stay
+        return replace(self, nodes=np.concatenate([self.nodes[stays], nodes])[order],
+                       gap=np.concatenate([self.gap[stays], gap])[order],
+                       slope=np.vstack([self.slope[stays], np.zeros((len(nodes), 2))])[order],
+                       edge=place[self.edge[kept]], window=self.window[kept],
+                       beneath=None if self.beneath is None else self.beneath.among(kept))
+
     def outwards(self) -> np.ndarray:
         """Squares (e, 2) of the x and y components of the direction from the nodes near an edge to that edge."""
         places = window_places()
@@ -88,6 +99,14 @@ class Beneath:
     gap: np.ndarray
     slope: np.ndarray
     window: np.ndarray
+
+    def among(self, kept: np.ndarray) -> "Beneath | None":
+        """Those of the nodes near an edge that are kept (e,), with their places among these."""
+        stays = kept[self.place]
+        if not stays.any():
+            return None
+        place = (np.cumsum(kept) - 1)[self.place[stays]]
+        return Beneath(place, self.gap[stays], self.slope[stays], self.window[stays])
 
 
 def window_places() -> np.ndarray:

@@ -2,16 +2,16 @@
 
 A node near an edge gets the plane of a facet and the heights of its surroundings over it. The facet is the one over the node
 or the lowest one nearby, whichever plane contains more of the surroundings. Beside a kink, where a node is touched only at larger
-depth, the node gets both (`Beneath`).
+depth, the node gets both (`Beneath`). A part of the object between nodes, which none is under, goes to the nearest one
+(`narrow_parts`).
 """
-
-from collections.abc import Callable
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import binary_dilation
 
-from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.narrow_parts import lowest_missed
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, ObjectPoints, hat_shares, window_places
 from softtact.contact.unilateral import depth_on_springs
@@ -29,10 +29,10 @@ _TRAPEZOID = np.array([0.25, 0.5, 0.25])
 class Underside:
     """An object's underside over the nodes of a grid;  lowest_mm: over the free surface."""
 
-    def __init__(self, surface: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]], grid: NodeGrid) -> None:
+    def __init__(self, surface: HeightField, grid: NodeGrid) -> None:
         self._surface, self._grid = surface, grid
         self._coarse = _sampled(surface, grid)
-        self.lowest_mm = float(self._coarse.min())
+        self.lowest_mm = min(float(self._coarse.min()), surface.first_touch_mm(grid.x, grid.y))
         if self.lowest_mm >= NO_CONTACT_MM:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
 
@@ -52,19 +52,34 @@ class Underside:
         height, slopes = self._facets(self._grid.points[plain])
         order = np.argsort(np.concatenate([plain, nodes]))
         edge = np.argsort(order)[len(plain):]
-        return ObjectPoints(nodes=np.concatenate([plain, nodes])[order], gap=np.concatenate([height, gap])[order],
-                            slope=np.vstack([slopes, slope])[order], edge=edge, window=window, step=self._grid.step,
-                            beneath=beneath)
+        found = ObjectPoints(nodes=np.concatenate([plain, nodes])[order], gap=np.concatenate([height, gap])[order],
+                             slope=np.vstack([slopes, slope])[order], edge=edge, window=window, step=self._grid.step,
+                             beneath=beneath)
+        missed = self._missed(found.nodes, found.gap, reach_mm)
+        touched = np.flatnonzero(missed < NO_CONTACT_MM)
+        return found.with_nodes(touched, missed[touched]) if len(touched) else found
 
     def nodes(self, reach_mm: float) -> ObjectPoints:
         """`points` without partial contact at edges: edges are less sharp, but no node is below the object."""
         height, slope = self._facets(self._grid.points)
+        missed = self._missed(np.arange(self._grid.count), height, reach_mm)
+        slope[missed < height] = 0.0
+        height = np.minimum(height, missed)
         kept = np.flatnonzero(height < self.lowest_mm + reach_mm)
-        if not len(kept):
-            raise InputError("The object touches between the nodes of the sensor's surface only; take the foundation model.")
         side = len(window_places())
         return ObjectPoints(nodes=kept, gap=height[kept], slope=slope[kept], edge=np.zeros(0, dtype=np.int64),
                             window=np.zeros((0, side, side), dtype=np.float32), step=self._grid.step)
+
+    def narrow_parts(self, reach_mm: float) -> bool:
+        """Whether the object has parts within `reach_mm` above its lowest point that no node is under."""
+        height = self._facets(self._grid.points)[0]
+        return bool((self._missed(np.arange(self._grid.count), height, reach_mm) < NO_CONTACT_MM).any())
+
+    def _missed(self, nodes, gap, reach_mm):
+        """`lowest_missed` (n,) where nodes (c,) see gaps (c,)."""
+        seen = np.full(self._grid.count, NO_CONTACT_MM)
+        seen[nodes] = gap
+        return lowest_missed(self._surface, self._grid, seen, self.lowest_mm + reach_mm)
 
     @property
     def _middle(self):

@@ -1,6 +1,7 @@
 """Presses of a placed object with the elastic and the foundation model: from its underside and forces to a `PressResult`."""
 
 import time
+import warnings
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,15 +14,16 @@ from softtact.contact.motion import Motion
 from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
-from softtact.errors import ConvergenceError, InputError
+from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.cache import cached_surface_compliance
-from softtact.press.making import make_result, shell_of, valid_elastic, valid_foundation, warn_of_shell
+from softtact.press.making import make_result, resolved_elastic, shell_of, valid_elastic, valid_foundation, warn_of_shell
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
 from softtact.progress import Watch
+from softtact.readout.capacitance import felt_displacement
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -52,7 +54,7 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
         return _on_foundation(sensor, near, forces_n, RunControl(label=""), time.perf_counter()).deformation_map_mm
     press = _elastic(sensor, surface, forces_n, first_touch_mm(sensor, surface), patches=True)
     warn_of_shell(sensor.spec, forces_n, _snapped(forces_n, press.contact.force.sum(axis=0)))
-    return press.maps if press.lower_maps is None else press.maps - press.lower_maps
+    return felt_displacement(sensor.spec, press.thinning)
 
 
 def _elastic(sensor, surface, forces, touch, *, patches=False):
@@ -101,9 +103,10 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
                        pad_force_n=_snapped(forces, contact.force.sum(axis=0)),
                        contact_area_mm2=press.areas @ (contact.force > 0),
                        penetration_mm=contact.penetration,
-                       within_validity=valid_elastic(depth, thickness_mm=thickness),
+                       within_validity=(valid_elastic(depth, thickness_mm=thickness)
+                                        & resolved_elastic(press.fields, dielectric_mm=sensor.spec.dielectric_thickness_mm)),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
-                       lower_maps=press.lower_maps, iterations=contact.iterations)
+                       felt_mm=felt_displacement(sensor.spec, press.thinning), iterations=contact.iterations)
 
 
 def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl) -> PressResult:
@@ -221,7 +224,19 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cont
         if isinstance(before := error.result, ElasticMotion):
             control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds))
         raise
-    return _of_motion(sensor, moved, seconds)
+    found = _of_motion(sensor, moved, seconds)
+    if not _between_nodes(sensor, HeightField(placed)):
+        return found
+    warnings.warn("The object has walls or pins that fall between the points of the elastic model's surface in some places of the "
+                  "motion: no step is within its validity; use the hyperelastic model.", NarrowPartWarning, stacklevel=4)
+    return replace(found, within_validity=np.zeros_like(found.within_validity))
+
+
+def _between_nodes(sensor, surface):
+    """Whether nodes miss parts of an object in its place, or half a step beside it."""
+    grid = sensor.prepared_models["elastic_surface"].grid
+    beside = (np.append(0.5 * grid.step * share, 0.0) for share in ((0, 0), (1, 0), (0, 1), (1, 1)))
+    return any(Underside(surface.moved(way), grid).narrow_parts(sensor.spec.thickness_mm) for way in beside)
 
 
 def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
@@ -254,7 +269,9 @@ def _of_motion(sensor, moved, seconds):
     attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}
     result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
                          np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
-                         within_validity=valid_elastic(moved.depth_mm, thickness_mm=sensor.spec.thickness_mm),
+                         felt_mm=felt_displacement(sensor.spec, moved.sunk_mm),
+                         within_validity=(valid_elastic(moved.depth_mm, thickness_mm=sensor.spec.thickness_mm)
+                                          & resolved_elastic(moved.sunk_mm, dielectric_mm=sensor.spec.dielectric_thickness_mm)),
                          frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
                          **{name: getattr(moved, name) for name in _OF_MOTION})
     return replace(result, attributes=result.attributes | attributes)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 from softtact.contact.shell import Shell
 from softtact.errors import InputError, ShellWarning
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 _NEGLIGIBLE = 1e-6     # of a force: largest share on the shell without a warning
 _DEEPEST_LINEAR = 0.5       # of the layer's thickness, beyond which a real layer is stiffer than a linear one
+_AROUND = 0.9              # of the deepest node: least mean of three by three nodes where a contact is wider than these
+_DEEPEST_NARROW = 0.5      # of the dielectric: a wall of 0.3 mm reads within 2 % wherever it stands up to 0.43, and 30 % at 0.58
 _SLIGHT_COMPRESSION = 0.33   # of a frustum's height: the foundation model's error is at most 2 % (docs/explanation/fast_models.md)
 _OVERLAP_LEFT = 3.0         # times the allowed overlap, or gap under pressure: above, the augmentations have failed
 _FEWEST_POINTS = 9          # contact points under pressure: fewer do not resolve the contact of a spike
@@ -37,17 +40,18 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
                 **numbers: Any) -> PressResult:
     """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
 
-    lower_maps among these: maps of a lower side that moves; capacitance follows from the change of thickness
+    lower_maps among these: maps of a lower side that moves; readings follow from the change of thickness
+    felt_mm among these: the change of thickness that readings follow from, where it is known between the maps' points
     pressure among these: `Samples` of the contact pressure at each load step, where the model gives it
     """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
     lower_maps, pressure = numbers.pop("lower_maps", None), numbers.pop("pressure", None)
-    thinning = maps if lower_maps is None else maps - lower_maps.reshape(maps.shape)
+    thinning = numbers.pop("felt_mm", maps if lower_maps is None else maps - lower_maps.reshape(maps.shape))
     flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8),
                              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
     warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
-    surface = layered_surface(spec, thinning, arrays.get("displacement_mm"), pressure)
+    surface = layered_surface(spec, thinning, arrays.get("displacement_mm", -maps[..., None] * [np.nan, np.nan, 1.0]), pressure)
     return PressResult(deformation_map_mm=maps, readings=readings_of(sensor.readouts, surface), normal_force_n=forces,
                        wall_time_s=times, x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
@@ -112,6 +116,16 @@ def _friction(spec, model):
 def valid_elastic(depth_mm: np.ndarray, *, thickness_mm: float) -> np.ndarray:
     """Which load steps (l,) of an elastic press are valid; depth_mm (l,): descent of the object's lowest point."""
     return depth_mm < _DEEPEST_LINEAR * thickness_mm
+
+
+def resolved_elastic(fields_mm: np.ndarray, *, dielectric_mm: float) -> np.ndarray:
+    """Which load steps (l,) of an elastic press the surface's nodes resolve, by its deformation (l, y, x) in mm at all of them.
+
+    Under a wall or a pin the surface is as steep as the nodes are close. Once it is deep in a dielectric, dielectric_mm thick,
+    whose capacitance then rises without bound, readings would depend on how the nodes happen to lie.
+    """
+    deepest, around = fields_mm.max(axis=(1, 2)), uniform_filter(fields_mm, (0, 3, 3)).max(axis=(1, 2))
+    return (around >= _AROUND * deepest) | (deepest < _DEEPEST_NARROW * dielectric_mm)
 
 
 def valid_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustum_mm: float, thickness_mm: float,

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 EPSILON_0_PF_PER_MM = 8.8541878128e-3
 _LEAST_GAP = 0.02         # of the dielectric's thickness, so that the plates never meet
 _SLICES, _STATES = 400, 2001
+_DISPLACEMENTS = 4001     # among which one of a given capacitance is interpolated: it is within 1e-7 mm
 
 
 def solid_share(frusta: "Frusta") -> np.ndarray:
@@ -63,6 +64,23 @@ def equivalent_air_gap(spec: "AnySpec", displacement_mm: float | np.ndarray) -> 
 def capacitance_per_area(spec: "AnySpec", displacement_mm: float | np.ndarray) -> np.ndarray:
     """Capacitance in pF/mm2 where the electrode plane moved towards the PCB by `displacement_mm` (any shape)."""
     return EPSILON_0_PF_PER_MM / equivalent_air_gap(spec, displacement_mm)
+
+
+def felt_displacement(spec: "AnySpec", displacement_mm: np.ndarray) -> np.ndarray:
+    """Displacement (..., ny, nx) in mm at the map's points that reads as the surface around them does.
+
+    displacement_mm (..., 2 ny - 1, 2 nx - 1): at half the map's steps, of quadratic elements with corners at the map's points
+    Its capacitance is the surroundings' mean, weighted by the point's hat function: Simpson's rule, a third of it and each
+    neighbour. The surface over a thin wall is steep; at the map's points alone it would read what happens to be there.
+    """
+    felt = 1 / equivalent_air_gap(spec, displacement_mm)
+    for axis in (-2, -1):
+        line = np.moveaxis(felt, axis, 0)
+        inner = (line[1:-2:2] + line[2:-1:2] + line[3::2]) / 3
+        ends = [(line[:1] + 2 * line[1:2]) / 3, (line[-1:] + 2 * line[-2:-1]) / 3]
+        felt = np.moveaxis(np.concatenate([ends[0], inner, ends[1]]), 0, axis)
+    table = np.linspace(min(0.0, displacement_mm.min()), (1 - _LEAST_GAP) * spec.dielectric_thickness_mm, _DISPLACEMENTS)
+    return np.interp(felt, 1 / equivalent_air_gap(spec, table), table)
 
 
 def ideal_counts(spec: "AnySpec", deformation_map_mm: np.ndarray, *, counts_per_relative_change: float = 1000.0) -> np.ndarray:

@@ -103,14 +103,13 @@ def _press_some(compliance, surface, heights, forces_n, settings):
                  for values in (np.stack(heights, axis=1), np.tile(forces_n, (len(heights), 1)), first)]
     areas = torch.as_tensor(area, dtype=torch.float64, device=surface.device)
     load_steps = press_columns(surface, *on_device, area=areas, settings=settings)
-    first_row = grid.first_of_second
-    every_second = surface.double(load_steps.force).reshape(*surface.shape, -1)[first_row::2, first_row::2]
-    maps = grid.with_held_sides(every_second.permute(2, 0, 1).cpu().numpy())
+    moved = surface.double(load_steps.force).reshape(*surface.shape, -1)
+    deformation = grid.with_held_sides(moved.permute(2, 0, 1).cpu().numpy())
     arrays = {field.name: getattr(load_steps, field.name).cpu().numpy() for field in fields(load_steps)}
     for press in range(len(heights)):
         own = slice(press * len(forces_n), (press + 1) * len(forces_n))
         contact = ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()})
-        yield LayerPress(maps=maps[own], areas=area, contact=contact)
+        yield LayerPress(fields=deformation[own], areas=area, contact=contact)
 
 
 def _depth_at_first(height, area, force_over_modulus):

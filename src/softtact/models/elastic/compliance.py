@@ -62,17 +62,17 @@ class Compliance:
         places = self.grid.quarter(points.nodes)
         return self.blocks.between(*places, *places)
 
-    def maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
-        """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with sides that are held."""
-        return self._maps(self.blocks, points, force)
+    def fields(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
+        """Deformation (l, 2 ny - 1, 2 nx - 1) in mm at all nodes, with sides that are held, of forces (c, l) in N at points."""
+        return self._fields(self.blocks, points, force)
 
-    def lower_maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray | None:
-        """Deformation maps of the lower side; None if it is fixed."""
-        return None if self.lower is None else self._maps(self.lower, points, force)
+    def lower_fields(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray | None:
+        """Deformation of the lower side; None if it is fixed."""
+        return None if self.lower is None else self._fields(self.lower, points, force)
 
-    def _maps(self, blocks, points, force):
+    def _fields(self, blocks, points, force):
         quarter = tuple(count // 2 + 1 for count in self.grid.shape)
-        inner = blocks.fields(quarter, *self.grid.quarter(points.nodes), force, every=2)
+        inner = blocks.fields(quarter, *self.grid.quarter(points.nodes), force)
         return self.grid.with_held_sides(inner.astype(float))
 
 
@@ -149,14 +149,24 @@ def _inverse_among(block, nodes):
 
 @dataclass(frozen=True)
 class LayerPress:
-    """maps (l, ny, nx) in mm of all load steps, the contact's `ContactLoadSteps`, areas (c,) in mm2 of its points, and maps of a
-    lower side that is free.
+    """fields (l, 2 ny - 1, 2 nx - 1): deformation in mm at the surface's nodes, at half the map's steps, of all load steps;
+    the contact's `ContactLoadSteps`;  areas (c,) in mm2 of its points;  lower_fields: of a lower side that is free
     """
 
-    maps: np.ndarray
+    fields: np.ndarray
     contact: ContactLoadSteps
     areas: np.ndarray
-    lower_maps: np.ndarray | None = None
+    lower_fields: np.ndarray | None = None
+
+    @property
+    def maps(self) -> np.ndarray:
+        """Deformation maps (l, ny, nx) in mm: every second node along x and y."""
+        return self.fields[:, ::2, ::2]
+
+    @property
+    def thinning(self) -> np.ndarray:
+        """By how much the layer is thinner at its nodes, (l, 2 ny - 1, 2 nx - 1) in mm."""
+        return self.fields if self.lower_fields is None else self.fields - self.lower_fields
 
 
 def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence[float] | np.ndarray, *,
@@ -175,8 +185,8 @@ def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence
                             foundation_modulus=compliance.foundation_modulus,
                             precondition=lambda x: own @ stencil(own.T @ x))
     contact = replace(contact, force=share.T @ contact.force, gap=own.T @ contact.gap)
-    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact, areas=areas,
-                      lower_maps=compliance.lower_maps(points, contact.force))
+    return LayerPress(fields=compliance.fields(points, contact.force), contact=contact, areas=areas,
+                      lower_fields=compliance.lower_fields(points, contact.force))
 
 
 def rest_on_shell(compliance: Compliance, points: ObjectPoints, count: int, depth_mm: float) -> LayerPress:
@@ -184,5 +194,5 @@ def rest_on_shell(compliance: Compliance, points: ObjectPoints, count: int, dept
     gap = np.tile((points.gap - depth_mm)[:, None], count)
     contact = ContactLoadSteps(force=np.zeros_like(gap), depth=np.full(count, depth_mm), gap=gap,
                                iterations=np.zeros(count, dtype=int), settled=np.ones(count, dtype=bool))
-    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact, areas=compliance.grid.areas(points.nodes),
-                      lower_maps=compliance.lower_maps(points, contact.force))
+    return LayerPress(fields=compliance.fields(points, contact.force), contact=contact, areas=compliance.grid.areas(points.nodes),
+                      lower_fields=compliance.lower_fields(points, contact.force))

@@ -262,6 +262,8 @@ class ElasticMotion:
     """(step,): how far the object is below its first touch."""
     displacement_mm: np.ndarray
     """(step, y, x, 3): of the surface's points on the map's grid; a deformation map is minus the last component."""
+    sunk_mm: np.ndarray
+    """(step, 2 y - 1, 2 x - 1): how far the surface's nodes, at half the map's steps, are down."""
     force_n: np.ndarray
     """(step, 3): the object's force on the sensor's surface; pressing down is negative in z."""
     torque_nmm: np.ndarray
@@ -368,6 +370,7 @@ def _result(compliance, states, counts):
     return ElasticMotion(
         depth_mm=np.array([state.position[2] for state in ends]),
         displacement_mm=np.stack([_displacement(compliance, state) for state in ends]),
+        sunk_mm=np.stack([_sunk(compliance, state) for state in ends]),
         force_n=forces, torque_nmm=np.stack([_torque(grid, state) for state in ends]),
         slip=np.stack([_slip_map(grid, state) for state in ends]),
         contact_area_mm2=np.array([grid.areas(np.flatnonzero(state.normal > 0)).sum() for state in ends]),
@@ -385,6 +388,16 @@ def _displacement(compliance, state):
         found = compliance.between(grid.second_nodes, touching, dtype=np.float32) @ force
         moved[:] = (found * [1.0, 1.0, -1.0]).T.reshape(moved.shape)
     return np.moveaxis(grid.with_held_sides(moved), 0, -1)
+
+
+def _sunk(compliance, state):
+    """(2 y - 1, 2 x - 1) in mm: how far all nodes are down, with sides that are held."""
+    grid, touching = compliance.grid, np.flatnonzero(state.normal > 0)
+    down = np.zeros(grid.count)
+    if len(touching):
+        force = np.column_stack([state.tangential, state.normal])[touching]
+        down = (compliance.between(np.arange(grid.count), touching, row_axes=(2,), dtype=np.float32) @ force)[:, 0]
+    return grid.with_held_sides(down.reshape(grid.shape))
 
 
 def _torque(grid, state):

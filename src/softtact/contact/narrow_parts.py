@@ -1,0 +1,44 @@
+"""Parts of an object that lie between the nodes of a grid: thin walls, pins, wires and ridges, which no node is under.
+
+A node sees the object's height above itself alone. A wall narrower than a step of the grid is above a row of nodes or not, so its
+contact would depend on where it stands. Such a part ends at edges of the object's facets, so points along these edges find it
+however thin it is. A point that no node around it sees is missed; the nearest node then takes its height.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+
+if TYPE_CHECKING:
+    from softtact.contact.node_grid import NodeGrid
+
+_SPACING = 0.5     # of a step: distance of points along an edge, so that none of the cells that it crosses is left out
+SEEN = 0.6         # slope between a node and a point up to which both belong to one part; a surface without an edge is less steep
+
+
+def lowest_missed(surface: HeightField, grid: "NodeGrid", gap_mm: np.ndarray, below_mm: float) -> np.ndarray:
+    """Heights (n,) in mm of the lowest part of an object in each node's cell that no node sees; NO_CONTACT_MM where there is none.
+
+    gap_mm (n,): heights that the nodes see, NO_CONTACT_MM for none;  below_mm: height from which on parts cannot touch
+    """
+    points = surface.along_edges(below_mm, _SPACING * grid.step.min())
+    last = np.array(grid.shape[::-1]) - 1
+    place = (points[:, :2] - grid.points[0]) / grid.step
+    inside = ((place > -0.5) & (place < last + 0.5)).all(axis=1)
+    place, height = place[inside], points[inside, 2]
+    missed = ~_seen(gap_mm.reshape(grid.shape), place, height, grid.step)
+    lowest, (i, j) = np.full(grid.shape, NO_CONTACT_MM), np.rint(place[missed]).astype(int).T
+    np.minimum.at(lowest, (j, i), height[missed])
+    return lowest.ravel()
+
+
+def _seen(gap, place, height, step):
+    """Whether one of the four nodes around places (k, 2), in steps, sees the object about as low as `height` (k,)."""
+    seen, last = np.zeros(len(place), dtype=bool), np.array(gap.shape[::-1]) - 1
+    for corner in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        node = np.clip(np.floor(place).astype(int) + corner, 0, last)
+        away = np.linalg.norm((node - place) * step, axis=1)
+        seen |= gap[node[:, 1], node[:, 0]] <= height + SEEN * away
+    return seen
