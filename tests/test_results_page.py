@@ -34,7 +34,8 @@ def run(tmp_path):
         (folder / name).mkdir(parents=True)
     (folder / "config.yaml").write_text(yaml.safe_dump({"study": "small", "seed": 17}))
     Image.fromarray(np.zeros((600, 1800, 3), dtype=np.uint8)).save(folder / "figures" / "fig7_maps.png")
-    claims = [{"claim": f"claim {k}", "where": "sec. 4", "paper": "1", "ours": "2", "verdict": verdict, "rule": "", "evidence": ""}
+    claims = [{"claim": f"claim {k}", "where": "sec. 4", "paper": "1", "ours": "2", "verdict": verdict, "rule": "", "evidence": "",
+               "uncertainty": f"{5 + k} objects"}
               for k, verdict in enumerate(["reproduced", "undecided"])]
     pd.DataFrame(claims).to_csv(folder / "tables" / "claims.csv", index=False)
     pd.DataFrame({"sentence": ["No robot."]}).to_csv(folder / "tables" / "gaps.csv", index=False)
@@ -71,6 +72,33 @@ def test_a_source_file_that_has_changed_since_is_named_by_a_warning(script, run,
     (script.FOLDER / "run.json").write_text(json.dumps(made))
     script.check()
     assert "1 source files have changed since (src/softtact/press/sensor.py)" in capsys.readouterr().err
+
+
+def test_a_page_whose_rules_have_changed_says_so_and_judges_again_what_its_table_tells(script, run):
+    script.write(run)
+    assert "by the rules of today" not in script.PAGE.read_text()
+    made = json.loads((script.FOLDER / "run.json").read_text())
+    made["sources"]["src/softtact/evaluation/decisions.py"] = "other"
+    (script.FOLDER / "run.json").write_text(json.dumps(made))
+    script.write_page()
+    text = script.PAGE.read_text()
+    assert "**These verdicts are older than the rules.**" in text and made["commit"][:12] in text
+    assert "| claim 0 | sec. 4 | 1 | 2 | reproduced | undecided |" in text       # five objects
+    assert "| Objects 1, 2 and 3 are smooth |" in text       # print needs no run
+
+
+def test_a_kept_verdict_is_undecided_by_few_objects_and_not_judged_again_by_many(script):
+    def today(claim, verdict, uncertainty):
+        (row,) = pd.DataFrame([{"claim": claim, "verdict": verdict, "uncertainty": uncertainty}]).itertuples()
+        return script.judged_today(row, {"in print": {"verdict": "consistent in print"}})
+
+    assert today("a", "reproduced", "standard error nan, 1 objects") == today("a", "not reproduced", "2 objects") == "undecided"
+    for known in ("standard error 0.1, 10 objects", "none: counts"):
+        assert today("a", "reproduced", known) == "not judged again"
+    assert today("a", "needs the archive", "3 objects") == "needs the archive"
+    assert today("A hyperelastic map takes minutes", "not reproduced", "195 maps") == "undecided"
+    assert today("object 4: reliefs", "reproduced", "counts") == "undecided"
+    assert today("in print", "contradicts itself", "") == "consistent in print"
 
 
 def test_a_page_that_was_never_made_is_said_to_be_missing(script, capsys):

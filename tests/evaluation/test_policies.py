@@ -1,10 +1,11 @@
 """Policies that choose a model, compared on presses whose errors are known."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray
 
-from softtact.evaluation.policies import choices, expected_over_true, policy_table, press_table
+from softtact.evaluation.policies import CHANCE, choices, expected_over_true, policy_table, press_table, with_chance
 from softtact.press.choice import INTERVALS
 
 FORCES = np.array([10.0, 20.0])
@@ -75,6 +76,23 @@ def test_a_model_is_taken_where_nine_of_ten_presses_are_within_the_tolerance_as_
     assert mostly > 1.2 * row.foundation_expected_mm
     for tolerance, model in ((1.01 * mostly, "foundation"), (0.99 * mostly, "hyperelastic")):
         assert choices(table, tolerance)[f"error, {1e3 * tolerance:g} um"][cup] == model
+
+
+def test_a_random_choice_of_the_papers_share_has_the_means_of_the_models_by_that_share():
+    """Two of three presses elastic: 2/3 of 0.09 mm and of 1 s, and 1/3 of 30 s."""
+    def row(policy, elastic, error, time):
+        return {"policy": policy, "presses": 3, "share_elastic": elastic, "share_foundation": 0.0,
+                "share_hyperelastic": 1 - elastic, "mean_error_mm": error, "time_per_press_s": time, "time_in_all_s": 3 * time}
+
+    policies = pd.DataFrame([row("always elastic", 1, 0.09, 1.0), row("always foundation", 0, 0.01, 2.0),
+                             row("always hyperelastic", 0, 0.0, 30.0), row("paper", 2 / 3, 0.05, 10.0),
+                             row("error, 5 um", 0, 0.0, 33.0)])
+    with_it = with_chance(policies)
+    assert list(with_it.policy)[3:5] == ["paper", CHANCE] and len(with_it) == 6
+    chance = with_it.set_index("policy").loc[CHANCE]
+    assert (chance.mean_error_mm, chance.time_per_press_s) == pytest.approx((0.06, 2 / 3 + 10))
+    pd.testing.assert_frame_equal(with_chance(with_it), with_it)
+    assert len(with_chance(policies[policies.policy != "paper"])) == 4
 
 
 def test_the_error_policy_pays_for_both_cheap_models_and_others_for_their_own(table):

@@ -12,8 +12,11 @@ DOCUMENT = HERE.parents[1] / "docs" / "reference" / "verification.md"
 INTRODUCTION = """\
 # Verification: are the equations solved right?
 
-Each row compares the code with a number that it did not produce itself: a closed form, a published value, another program, or a
-plain solver without the fast methods. The tests in `tests/verification/` state the number and its source first, then compare, and
+Most rows compare the code with a number that it did not produce itself: a closed form, a published value or another program. Some
+compare it with itself: with a plain solver of this project that lacks the fast methods, a finer mesh, more steps, or the same press
+without an effect (their source says so: "plain", "bonded tips", "the press without friction", "limit of refinement", "finite
+differences" and the like). Those show that two ways agree; a fault in what both share, such as the law or the contact's definition,
+they do not show. The tests in `tests/verification/` state the number and its source first, then compare, and
 give a reason for each tolerance. Whether these are the right equations for a real sensor (validation) is another question, which
 this page does not answer.
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MODELS = ("elastic", "foundation", "hyperelastic")
 CALIBRATION_SET = "indenters"
+CHANCE = "random, the paper's share"
 
 
 def press_table(presses: "Sequence[dict[str, xarray.Dataset]]", paper_choice: dict[str, str], *,
@@ -76,7 +77,25 @@ def policy_table(table: pd.DataFrame, tolerances_mm: Iterable[float], *, sets: S
     for tolerance in tolerances_mm:
         for policy, chosen in choices(table, tolerance).items():
             rows.setdefault(policy, _summary(table, policy, chosen, tolerance))
-    return pd.DataFrame(rows.values())
+    return with_chance(pd.DataFrame(rows.values()))
+
+
+def with_chance(policies: pd.DataFrame) -> pd.DataFrame:
+    """A `policy_table` with a row behind the paper's: what its rule would have if it drew its presses.
+
+    As many presses of each model, each press as likely as any other, so the means are those of the models by the paper's shares.
+    The table as it is where it has that row, or lacks the paper's or a model's.
+    """
+    by_name = policies.set_index("policy")
+    models = [f"always {model}" for model in MODELS]
+    if CHANCE in by_name.index or not {"paper", *models} <= set(by_name.index):
+        return policies
+    shares = by_name.loc["paper", [f"share_{model}" for model in MODELS]]
+    means = {name: float(shares.to_numpy(dtype=float) @ by_name.loc[models, name].to_numpy(dtype=float))
+             for name in ("mean_error_mm", "time_per_press_s", "time_in_all_s")}
+    row = {"policy": CHANCE, "presses": by_name.presses["paper"], **shares, **means}
+    place = list(policies.policy).index("paper") + 1
+    return pd.concat([policies.iloc[:place], pd.DataFrame([row]), policies.iloc[place:]], ignore_index=True)
 
 
 def _summary(table, policy, chosen, tolerance):

@@ -202,8 +202,8 @@ def _synthetic(ftir, settings):
     config = settings["config"]
     rubs = "friction, " if config.get("models", {}).get(config.get("reference"), {}).get("friction") else ""
     readings = ("the readings are own recordings of a TSF-85, so SSIM values below are against them" if recorded(settings) else
-                f"the readings come from a virtual sensor (another law, another mesh, {rubs}scatter, hysteresis, noise). SSIM "
-                "values below are against that virtual sensor")
+                f"the readings come from a virtual sensor (a law of another name fitted to the same curves, another mesh, {rubs}"
+                "scatter, hysteresis, noise). SSIM values below are against that virtual sensor")
     return ("The paper's curves, camera frames and taxel readings are not published here. Stress-strain curves are made from "
             f"its printed constants with noise; the measured contact area is from: {ftir['source']}; {readings} and are not the "
             "paper's.")

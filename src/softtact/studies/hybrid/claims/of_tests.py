@@ -34,7 +34,7 @@ def claims_of_materials(cards: Sequence[dict[str, Any]]) -> Iterator[dict[str, s
                    "on measured curves, the 95 % interval of the RMSE below 0.01 MPa", "tables/table1_materials.csv",
                    uncertainty=_fit_error(card, chosen))
         yield from _printed_errors(card, measured)
-        yield from _printed_constants(card)
+        yield from claims_of_constants(card)
 
 
 def _standard_error(card, fit):
@@ -65,8 +65,8 @@ def _printed_errors(card, measured):
                       uncertainty=_fit_error(card, fit))
 
 
-def _printed_constants(card):
-    """Do the printed laws, and the printed modulus, belong to one tensile test? No row where nothing is printed."""
+def claims_of_constants(card: dict[str, Any]) -> Iterator[dict[str, str]]:
+    """Do the printed laws and moduli of a card {material, printed} belong to one tensile test? No row where nothing is printed."""
     printed, name = card.get("printed", {}), card["material"]
     laws = {law: make_law(law, entry["parameters"]) for law, entry in printed.items() if law != "linear"}
     evidence = f"materials/{name}.json"

@@ -22,6 +22,7 @@ _LONGER = "A hyperelastic map takes longer than an elastic one"
 _COSTS = "The hyperelastic model costs several times the elastic one"
 _MINUTES = "A hyperelastic map takes minutes"
 _HARDEST = "The hardest maps take many times the mean"
+NOT_JUDGED = (_COSTS, _MINUTES, _HARDEST)
 _NOT_COMPARABLE = "no verdict: times of another machine, solver and mesh are not comparable"
 
 
