@@ -12,7 +12,7 @@ from support.laws import LAWS
 from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.newton import _Press
 from softtact.press import choice
-from softtact.press.sensor import Sensor, load_sensor
+from softtact.press.sensor import Sensor
 
 BALL = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
 
@@ -84,7 +84,7 @@ def fakes(monkeypatch):
 
 
 def chosen(**options):
-    return load_sensor("coro").press(BALL, force_n=[0.5], label="", **options)
+    return Sensor(SMALL, LAWS, mesh=COARSE).press(BALL, force_n=[0.5], label="", **options)
 
 
 def test_auto_takes_the_cheapest_model_within_the_tolerance_by_default(fakes):

@@ -273,7 +273,7 @@ def _summary_on_layers(result):
              "within_validity",
              "iterations", "wall_time_s")
     load_steps |= {name: getattr(result, name) for name in names}
-    load_steps |= {"torque_nmm": result.torque_nmm}
+    load_steps |= {name: getattr(result, name) for name in ("torque_nmm", "hyperelastic_counts", "expected_error_counts")}
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
     facts["expected_error_interval"] = ([result.attributes[f"expected_error_times_{end}"] for end in ("low", "high")]
                                         if "expected_error_times_low" in result.attributes else None)
@@ -335,6 +335,15 @@ def _range_line(summary):
         yield f"taxels at the end of the converter's range ({summary['largest_counts']:g} counts), which read too little: {steps}"
 
 
+def _count_lines(summary):
+    """The error to expect in counts of all taxels, at each load step."""
+    steps = zip(summary["normal_force_n"], summary["tactile_map"], summary["hyperelastic_counts"], strict=True)
+    for force, counts, (low, middle, high) in steps:
+        read = sum(map(sum, counts))
+        share = f", {abs(read - middle) / read:.0%} {'less' if read > middle else 'more'}" if read > 0 else ""
+        yield f"counts to expect of the hyperelastic model at {force:.4g} N: {middle:.0f} ({low:.0f} to {high:.0f}){share}"
+
+
 def _quality_lines(summary):
     """The quality of the solution, as the worst of the load steps."""
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
@@ -344,6 +353,8 @@ def _quality_lines(summary):
         yield f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm"
     if None not in summary["expected_error_mm"]:
         yield from _error_line(summary)
+    if None not in summary["expected_error_counts"]:
+        yield from _count_lines(summary)
     yield from _range_line(summary)
     if not all(summary["within_validity"]):
         flagged = zip(summary["normal_force_n"], summary["within_validity"], strict=True)

@@ -21,6 +21,7 @@ from trimesh import Trimesh
 from softtact.errors import ConvergenceError, InputError, ShellWarning, TimeLimitError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
 from softtact.press.cache import in_words
+from softtact.press.count_error import hyperelastic_counts
 from softtact.press.fast import press_elastic, press_on_foundation
 from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.reached import Reached
@@ -111,12 +112,24 @@ def with_expected_error(sensor: "Sensor", result: PressResult) -> PressResult:
     """The result of a fast model with its expected error, if the sensor has frusta, for which the errors were calibrated."""
     if result.model not in ("elastic", "foundation") or np.isnan(sensor.spec.frustum_height_mm):
         return result
+    if np.isnan(result.hyperelastic_counts).all():
+        result = replace(result, hyperelastic_counts=_counts_of_hyperelastic(sensor, result))
     if not np.isnan(np.asarray(result.expected_error_mm)).all():
         return _with_interval(result, result.model)
     expected = (ELASTIC_RELATIVE * rms(result.deformation_map_mm) if result.model == "elastic" else
                 foundation_error(result, height_mm=sensor.spec.frustum_height_mm, thickness_mm=sensor.spec.thickness_mm))
     name = "elastic alone" if result.model == "elastic" else result.model
     return _with_interval(replace(result, expected_error_mm=expected), name)
+
+
+def _counts_of_hyperelastic(sensor, result):
+    """Counts (l, 3) to expect of the hyperelastic model where a fast model was pressed."""
+    if result.model == "elastic":
+        return hyperelastic_counts(sensor.spec, result)
+    error = foundation_error(result, height_mm=sensor.spec.frustum_height_mm, thickness_mm=sensor.spec.thickness_mm)
+    depth = rms(result.deformation_map_mm)
+    relative = np.divide(error, depth, out=np.zeros_like(depth), where=depth > 0)
+    return hyperelastic_counts(sensor.spec, result, INTERVALS["foundation"][1] * relative)
 
 
 def _with_interval(result, name):
@@ -188,6 +201,8 @@ def _by_error(sensor, placed, forces, tolerance_mm, control):
         reason += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     spent = sum(result.wall_time_s for result in pressed.values())
     if model != "hyperelastic":
+        if model == "elastic" and "foundation" in pressed:     # which is nearer to the hyperelastic model in this very press
+            pressed[model] = replace(pressed[model], hyperelastic_counts=_counts_of_hyperelastic(sensor, pressed["foundation"]))
         return replace(pressed[model], selection_reason=reason, expected_error_mm=errors[model], wall_time_s=spent)
     if control.time_limit_s is not None:      # less the time of the fast presses
         control = replace(control, time_limit_s=control.time_limit_s - (time.monotonic() - start))

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 
 _ABSENT: Any = None      # a field that a sensor or a model does not have
+_LATER = {"later": True}     # a field that files of earlier versions do not hold
 _PLANE = {"plane": True}     # a field of sensors with a plane of maps
 
 
@@ -105,6 +106,9 @@ class PressResult:
     expected_error_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step"))
     """(step,) in mm: expected error against the hyperelastic model, root mean square over the map, for a fast model on frusta and
     where the model was chosen by it; else nan. Its accuracy: docs/explanation/fast_models.md."""
+    hyperelastic_counts: np.ndarray = field(default=_ABSENT, metadata=_array("counts", "step", "bound") | _LATER)
+    """(step, 3) in counts of all taxels: what the hyperelastic model is expected to read in place of a fast model, least, middle
+    and most, for nine in ten presses; else nan. See `expected_error_counts`."""
     selection_reason: str = field(default="", metadata=_FACT)
     """The reason for the choice of the model, if the user did not name it."""
     largest_counts: float = field(default=2400.0, metadata=_FACT)
@@ -124,7 +128,7 @@ class PressResult:
         defaults: dict[str, Callable[[], np.ndarray]] = {
             "pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
             "force_n": lambda: -self.normal_force_n[:, None] * down, "torque_nmm": lambda: np.full((steps, 3), np.nan),
-            "expected_error_mm": lambda: np.full(steps, np.nan)}
+            "expected_error_mm": lambda: np.full(steps, np.nan), "hyperelastic_counts": lambda: np.full((steps, 3), np.nan)}
         if self.deformation_map_mm is not None:
             unknown = np.where(down == 0, np.nan, 1.0)
             defaults |= {"displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
@@ -160,6 +164,13 @@ class PressResult:
     def taxels_at_range_end(self) -> np.ndarray:
         """(step,) how many taxels read `largest_counts`, where the converter ends: what they feel is more than they read."""
         return (self.tactile_map >= self.largest_counts).sum(axis=(1, 2))
+
+    @property
+    def expected_error_counts(self) -> np.ndarray:
+        """(step,) in counts of all taxels: how much more a fast model is expected to read than the hyperelastic one; else nan."""
+        if "taxels" not in self.readings:
+            return np.full(self.steps, np.nan)
+        return self.tactile_map.sum(axis=(1, 2)) - self.hyperelastic_counts[:, 1]
 
     def load(self, frame: str) -> np.ndarray:
         """Loads (s, 6) in N and N mm of a frame of the solids by its name, such as `object`."""
@@ -310,7 +321,8 @@ def read_press(path: str | Path) -> PressResult:
         data = _renewed(path, data)
     elif "kind" in data.attrs and "deformation_map_mm" not in data:
         raise InputError(f"{path}: it holds no whole press; give a file that softtact press --out or PressResult.write made.")
-    needed = [one for one in _arrays() if "plane" not in one.metadata or "deformation_map_mm" in data or "node_mm" not in data]
+    held = [one for one in _arrays() if "later" not in one.metadata or _name(one) in data]
+    needed = [one for one in held if "plane" not in one.metadata or "deformation_map_mm" in data or "node_mm" not in data]
     missing = [name for name in (*map(_name, needed), *_facts()) if name not in data.variables and name not in data.attrs]
     if missing:
         raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); give a file that softtact press --out or "
