@@ -463,6 +463,8 @@ def test_repeated_readings_decide_on_hysteresis_only_if_they_are_the_papers():
     assert verdict(table(ceiling=ceiling, source="published archive"), name) == "reproduced"
     assert verdict(table(ceiling=ceiling.assign(ssim=0.9999), source="published archive"), name) == "not reproduced"
     assert verdict(table(ceiling=ceiling.iloc[:5], source="published archive"), name) == "undecided"
+    places = ceiling.assign(item=[f"object_1-{k}" for k in range(6)])        # six presses of one object
+    assert verdict(table(ceiling=places, source="published archive"), name) == "undecided"
     assert verdict(table(), name) == "undecided"
 
 

@@ -23,6 +23,7 @@ from softtact.evaluation.decisions import (
     wider_spread,
 )
 from softtact.evaluation.score_tables import ALL_FORCES
+from softtact.learning.dataset import object_of
 from softtact.published.archive import PRINTED_SSIM
 from softtact.published.archive import SOURCE as PUBLISHED
 
@@ -347,7 +348,7 @@ def _repeats(ceiling, source):
     rule = f"on the paper's readings, the sensor's SSIM against itself is below {REPEATABLE:g}; {RULE}"
     if ceiling is None or not len(ceiling):
         return row(claim, "sec. 4.2", printed, f"no press was read twice, {source}", UNDECIDED, rule, "evaluation/ceiling.csv")
-    mean = mean_over_objects(ceiling.groupby("item").ssim.mean())
+    mean = mean_over_objects(ceiling.ssim.groupby(ceiling["item"].map(object_of)).mean())
     return row(
         claim,
         "sec. 4.2",
