@@ -17,7 +17,8 @@ def test_the_command_writes_tables_pictures_fields_and_a_page(tmp_path, capsys):
     (tmp_path / "design.yaml").write_text(yaml.safe_dump(design))
     assert main(["palpate", str(tmp_path / "design.yaml"), "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
-    assert "ecoflex_00_30, load: trend line" in said and "not reproduced: F/d is a property" in said
+    # The tiny mesh is too coarse to decide: its error exceeds the tolerances.
+    assert "ecoflex_00_30, load: trend line" in said and "undecided: F/d is a property" in said
     curves = pd.read_csv(tmp_path / "out/tables/curves.csv")
     assert len(curves) == 2 * (3 + 2) and (curves.film_left_n > 0).all()
     page = (tmp_path / "out/report.html").read_text()
