@@ -36,7 +36,7 @@ def test_every_frustum_stands_below_the_sheet_once_and_follows_its_mean_descent(
 def test_an_object_beside_the_sensor_is_refused():
     sensor = softtact.load_sensor("pad4x4")
     far = trimesh.creation.box((1, 1, 1)).apply_translation((30, 0, 0))
-    with pytest.raises(InputError, match="nothing of it is over the 10 x 16 mm footprint"):
+    with pytest.raises(InputError, match="no part of it is over the 10 x 16 mm footprint"):
         SolidPad(sensor).with_rigid(far, threads=1)
 
 
