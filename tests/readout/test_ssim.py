@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.readout.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
+from softtact.readout.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts, whole_map_ssim
 
 CHOICES = {"window": 3, "data_range": 2400}
 
@@ -73,3 +73,11 @@ def test_each_trial_is_held_against_the_mean_of_the_others(maps):
     trials = maps[:3]
     expected = map_ssim(trials[1:].mean(axis=0, keepdims=True), trials[:1], **CHOICES)
     assert leave_one_out_ssim(trials, **CHOICES)[0] == pytest.approx(expected[0])
+
+
+def test_one_window_over_the_whole_map_is_the_formula_on_all_taxels(maps):
+    a, b = maps[0].ravel(), maps[1].ravel()
+    c1, c2, covariance = (0.01 * 2400) ** 2, (0.03 * 2400) ** 2, np.cov(maps[0].ravel(), maps[1].ravel())
+    by_hand = (2 * a.mean() * b.mean() + c1) * (2 * covariance[0, 1] + c2) / (
+        (a.mean() ** 2 + b.mean() ** 2 + c1) * (covariance[0, 0] + covariance[1, 1] + c2))
+    assert whole_map_ssim(maps[:1], maps[1:2], data_range=2400) == pytest.approx([by_hand])

@@ -108,10 +108,26 @@ def count_features(map_mm: np.ndarray) -> int:
     return int(ndimage.label(map_mm > STANDS_OUT * map_mm.max(), structure=np.ones((3, 3)))[1])
 
 
-def feature_masks(heights_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(raised, lower) masks (y, x) of an object's underside: the parts that touch first, and those LOWER_MM above them."""
+def feature_masks(heights_mm: np.ndarray, *, lower_mm: float = LOWER_MM,
+                  same_mm: float = _SAME_HEIGHT_MM) -> tuple[np.ndarray, np.ndarray]:
+    """(raised, lower) masks (y, x) of an object's underside: the parts that touch first, and those `lower_mm` above.
+
+    same_mm: heights within it are one
+    """
     rise = heights_mm - np.nanmin(heights_mm)
-    return rise < _SAME_HEIGHT_MM, np.abs(rise - LOWER_MM) < _SAME_HEIGHT_MM
+    return rise < same_mm, np.abs(rise - lower_mm) < same_mm
+
+
+def lower_shares(maps_mm: np.ndarray, heights_mm: np.ndarray, *, lower_mm: float) -> np.ndarray:
+    """Mean deformation under the lower feature over that under the raised ones (l,), of maps (l, y, x) in mm.
+
+    heights_mm (y, x): of the object over the map's grid, nan beside it;  lower_mm: by which the lower feature stands back
+    nan where no point of the map lies under one of the two.
+    """
+    raised, lower = feature_masks(heights_mm, lower_mm=lower_mm, same_mm=min(_SAME_HEIGHT_MM, 0.4 * lower_mm))
+    if not (raised.any() and lower.any()):
+        return np.full(len(maps_mm), np.nan)
+    return maps_mm[:, lower].mean(axis=1) / maps_mm[:, raised].mean(axis=1)
 
 
 def measure_press(press: "xarray.Dataset", heights_mm: np.ndarray, *, frustum_height_mm: float) -> dict[str, Any]:

@@ -167,10 +167,10 @@ def _fault(model, field, fault):
     return f"{field} is {fault['input']!r:.80}; {reason[0].lower()}{reason[1:]}."
 
 
-def law_from_printed(material_yaml: str | Path, law: str) -> Law:
-    """The `Law` with the constants that a material's YAML prints for it."""
+def law_from_printed(material_yaml: str | Path, law: str, *, bulk_over_shear: float | None = None) -> Law:
+    """The `Law` with the constants that a material's YAML prints for it; bulk_over_shear: K / mu0, by default that of the file."""
     config = load_material(material_yaml)
-    return make_law(law, _printed_parameters(config, law), bulk_over_shear=config.fit.bulk_over_shear)
+    return make_law(law, _printed_parameters(config, law), bulk_over_shear=bulk_over_shear or config.fit.bulk_over_shear)
 
 
 def _printed_parameters(config, law):

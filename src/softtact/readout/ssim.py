@@ -10,6 +10,7 @@ import numpy as np
 from softtact.errors import InputError
 
 LEAST_RANGE = 30.0     # counts: four standard deviations of the virtual sensor's offsets and noise together
+_K1, _K2 = 0.01, 0.03     # of SSIM's two constants, as everywhere
 
 
 def map_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int, data_range: float) -> np.ndarray:
@@ -37,6 +38,20 @@ def own_range_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int) 
     ranges = np.maximum(np.abs(measured).max(axis=(1, 2)), LEAST_RANGE)
     return np.array([map_ssim(a[None], b[None], window=window, data_range=float(top))[0]
                      for a, b, top in zip(predicted, measured, ranges, strict=True)])
+
+
+def whole_map_ssim(predicted: np.ndarray, measured: np.ndarray, *, data_range: float) -> np.ndarray:
+    """SSIM (n,) of maps (n, row, column) with one window that holds the whole map; constants and covariance as for `map_ssim`.
+
+    The largest window that a publication can have taken, as 3 is the smallest.
+    """
+    check_maps(predicted, measured, 1)
+    a, b = (np.asarray(maps, dtype=float).reshape(len(maps), -1) for maps in (predicted, measured))
+    c1, c2 = (_K1 * data_range)**2, (_K2 * data_range)**2
+    mean_a, mean_b = a.mean(axis=1), b.mean(axis=1)
+    covariance = ((a - mean_a[:, None]) * (b - mean_b[:, None])).sum(axis=1) / (a.shape[1] - 1)
+    spread = a.var(axis=1, ddof=1) + b.var(axis=1, ddof=1)
+    return (2 * mean_a * mean_b + c1) * (2 * covariance + c2) / ((mean_a**2 + mean_b**2 + c1) * (spread + c2))
 
 
 def others_mean(trials: np.ndarray) -> np.ndarray:

@@ -11,7 +11,14 @@ from softtact.contact.underside import Underside
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.models.elastic.compliance import Compliance, elastic_compliance, elastic_slab, map_cells, press_layer
+from softtact.models.elastic.compliance import (
+    Compliance,
+    elastic_compliance,
+    elastic_slab,
+    electrode_plane_compliance,
+    map_cells,
+    press_layer,
+)
 from softtact.press.cache import cached_compliance
 from softtact.press.sensor import Sensor
 from softtact.sensors.fields import Edge
@@ -152,3 +159,21 @@ def test_points_inside_a_large_contact_may_share_their_pressure():
     assert np.abs(shared.maps - each.maps).max() < 0.01 * each.maps.max()
     assert shared.contact.force.sum(axis=0) == pytest.approx(FORCES) and shared.contact.force.shape == each.contact.force.shape
     assert shared.contact.depth == pytest.approx(each.contact.depth, rel=1e-3)
+
+
+def test_under_a_plate_over_all_the_electrodes_plane_moves_by_its_share_of_the_thickness(compliance):
+    """A layer whose sides hardly matter is compressed evenly: at 1 of 2.5 mm it moves by 0.4 of the top.
+
+    At the middle of a pad four times as wide as thick, with sides held below the plane alone: within 2 %.
+    """
+    plate = Underside(HeightField(place(trimesh.creation.box((12.0, 12.0, 2.0)))), compliance.grid)
+    inner = electrode_plane_compliance(SMALL)
+    maps = {name: press_layer(one, plate.nodes(1.0), FORCES).maps[-1] for name, one in (("top", compliance), ("plane", inner))}
+    assert maps["plane"][6, 6] / maps["top"][6, 6] == pytest.approx(0.4, rel=0.02)
+
+
+def test_twice_the_modulus_halves_the_map_of_a_plate(compliance):
+    """A plate touches everywhere at any force, so the map is proportional to force over modulus: single precision."""
+    plate = Underside(HeightField(place(trimesh.creation.box((12.0, 12.0, 2.0)))), compliance.grid).nodes(1.0)
+    stiff, soft = (press_layer(one, plate, FORCES).maps for one in (compliance.stiffened(2.0), compliance))
+    assert stiff == pytest.approx(0.5 * soft, abs=1e-5 * soft.max())

@@ -21,8 +21,10 @@ from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks
 from softtact.progress import progress
 from softtact.sensors.base import BaseSpec
 from softtact.sensors.fields import ElasticLayer
+from softtact.sensors.frusta import SensorSpec
 
 _SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
+_ABOVE_PLANE, _BELOW_PLANE = (0.4, 0.35, 0.25), (0.55, 0.45)     # the same of the parts above and below the electrodes' plane
 _SINGLE = 2                            # rows of points along a contact's edge, where pressure is steep, that share none
 _REACH = 1                            # nodes that the preconditioner looks around; 2 and 3 cost as much as they save
 _MARGIN = 8                           # nodes about these that it is computed with: those beyond change it by less than 1e-6
@@ -57,6 +59,12 @@ class Compliance:
                        foundation_modulus=float(data["foundation_modulus"]),
                        stencil=Stencil(data["stencil"]), lower=ParityBlocks(data["lower"]) if "lower" in data else None)
 
+    def stiffened(self, factor: float) -> "Compliance":
+        """The compliance of the same layer with `factor` times the modulus."""
+        lower = None if self.lower is None else ParityBlocks(self.lower.blocks / np.float32(factor))
+        return replace(self, blocks=ParityBlocks(self.blocks.blocks / np.float32(factor)), lower=lower,
+                       foundation_modulus=factor * self.foundation_modulus, stencil=Stencil(factor * self.stencil.values))
+
     def among(self, points: ObjectPoints) -> np.ndarray:
         """Compliance (c, c) among `ObjectPoints`."""
         places = self.grid.quarter(points.nodes)
@@ -74,6 +82,19 @@ class Compliance:
         quarter = tuple(count // 2 + 1 for count in self.grid.shape)
         inner = blocks.fields(quarter, *self.grid.quarter(points.nodes), force)
         return self.grid.with_held_sides(inner.astype(float))
+
+
+@dataclass(frozen=True)
+class InnerPlaneCompliance(Compliance):
+    """A `Compliance` whose maps are of a plane inside the layer, to which its `lower` belongs; contact is that of the top."""
+
+    def maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
+        """Deformation maps (l, ny, nx) in mm of the plane."""
+        return self._maps(self.lower, points, force)
+
+    def lower_maps(self, points: ObjectPoints, force: np.ndarray) -> None:
+        """None: the layer's lower side is fixed."""
+        return None
 
 
 def map_cells(spec: BaseSpec) -> tuple[int, ...]:
@@ -110,6 +131,23 @@ def elastic_compliance(spec: BaseSpec, *, threads: int = 1, cells: tuple[int, ..
                       foundation_modulus=confined_modulus(spec.elastic_layer) / spec.thickness_mm,
                       stencil=_stencil(blocks, slab.top.shape),
                       lower=None if spec.base_held else ParityBlocks(both[:, count:]))
+
+
+def electrode_plane_compliance(spec: SensorSpec, *, threads: int = 1) -> InnerPlaneCompliance:
+    """The `InnerPlaneCompliance` of a sensor's elastic layer whose maps are of the electrodes' plane, on top of the dielectric."""
+    layer, parts = spec.elastic_layer, (spec.cover.thickness_mm, spec.dielectric_thickness_mm)
+    bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
+    above, below = (LinearLayer(thickness, bulk, shear, shares)
+                    for thickness, shares in zip(parts, (_ABOVE_PLANE, _BELOW_PLANE), strict=True))
+    slab = QuarterSlab(spec.footprint_mm, [below, above], map_cells(spec), base_held=True, held_below_mm=spec.edge.held_below_mm)
+    planes, count = [slab.top, slab.below_top(slab.boundary_over(below))], slab.top.size
+    kept = 3 * np.concatenate([plane.ravel() for plane in planes]) + 2
+    both = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads, dtype=np.float32)[:, :count]
+                     for parity in progress(PARITIES, label=f"{spec.name}: compliance at the electrodes, a quarter's parities")])
+    blocks = both[:, :count]
+    return InnerPlaneCompliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks),
+                                foundation_modulus=confined_modulus(layer) / spec.thickness_mm,
+                                stencil=_stencil(blocks, slab.top.shape), lower=ParityBlocks(both[:, count:]))
 
 
 def confined_modulus(layer: ElasticLayer) -> float:
