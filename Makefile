@@ -1,5 +1,6 @@
 # `make`: the default study.  `make tiny`: its smallest form.  `make docs`: the documentation.
 # `make skin`, `make grasps`, `make probe`: a robot skin, grasps by a robot, a palpation sensor; `make tiny-skin` and so on: their smallest forms.
+# `make decide`: do the paper's claims hold? Some hours.
 # `make everything`: all default studies.  `make studies`: the smallest forms of all.  `make overview`: Snakemake's report of them.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results page in docs/, from a finished run of the default study.
@@ -8,20 +9,20 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-DEFAULT_STUDIES = config skin probe grasps
-TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps
+DEFAULT_STUDIES = config skin probe grasps decide
+TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps tiny-decide
 
-.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps test test-slow lint advice bench docs numbers results clean
+.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
 	@echo "Open results/default/report.html"
 
-$(TINY_STUDIES) skin probe grasps: .venv/installed
+$(TINY_STUDIES) skin probe grasps decide: .venv/installed
 	$(SNAKEMAKE) --configfile config/$(subst -,_,$@).yaml
 	@echo "Open results/$(subst -,_,$@)/report.html"
 
-everything: study skin probe grasps
+everything: study skin probe grasps decide
 
 studies: $(TINY_STUDIES)
 
@@ -53,7 +54,7 @@ lint: .venv/tested
 
 # Advice on the workflow; what of it stays, and why, stands in workflow/README.md.
 advice: .venv/tested
-	-for name in tiny tiny_skin tiny_probe tiny_grasps; do $(BIN)/snakemake --configfile config/$$name.yaml --lint; done
+	-for name in tiny tiny_skin tiny_probe tiny_grasps tiny_decide; do $(BIN)/snakemake --configfile config/$$name.yaml --lint; done
 	@sed -n '/^## Advice/,/^## /p' workflow/README.md
 
 # The workflow finds its own interpreter; the environment need not be activated.

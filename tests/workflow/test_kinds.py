@@ -35,6 +35,7 @@ CASES = [
     Case("grasps", "config/tiny_grasps.yaml", ("trials: 3", "trials: 4"), "robot/scene.py", "grasp",
          "config/objects/grasped/object_3.stl"),
     Case("skin", "config/tiny_skin.yaml", ("draws: 200", "draws: 201"), "skin/maps.py", "read_taxels"),
+    Case("decide", "config/tiny_decide.yaml", ("epochs: 3", "epochs: 4"), "readout/virtual_sensor.py", "press"),
     Case("palpation", "config/tiny_probe.yaml", ("variant_steps: 3", "variant_steps: 4"), "probe/lump.py", "sweep"),
 ]
 # The stages that these changes rerun, by hand; those of the other kinds follow from their list of jobs.

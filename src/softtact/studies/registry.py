@@ -44,6 +44,8 @@ KINDS = {
                       "softtact.studies.palpation.jobs:jobs"),
     "grasps": Kind("softtact.studies.grasps.config:read_values", "softtact.studies.grasps.config:load_study",
                    "softtact.studies.grasps.jobs:jobs"),
+    "decide": Kind("softtact.studies.decide.config:read_values", "softtact.studies.decide.config:load_study",
+                   "softtact.studies.decide.jobs:jobs"),
 }
 
 

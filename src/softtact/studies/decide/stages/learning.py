@@ -1,0 +1,103 @@
+"""Scores of the readouts: formulas for all models at once, networks model by model."""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from softtact.files import write_csv
+from softtact.studies.decide.config import MODELS
+from softtact.studies.decide.scoring import COLUMNS, COMPACT, PRINTED, Case, formula_predictions, object_scores, read_case
+
+if TYPE_CHECKING:
+    from softtact.learning.dataset import Samples
+
+CURVE_COLUMNS = ["truth", "model", "share", "indenters", "maps", "best_epoch", "epochs", "error_share", "ssim_own_range"]
+
+
+def score_formulas(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Score the gap formula with one gain and the quadratic, for all tested models against one truth.
+
+    inputs: readings, maps, sensor;  outputs: scores (CSV)
+    settings: truth, seed, ssim_window
+    """
+    case = read_case(inputs)
+    frames = [object_scores(samples, predicted, window=settings["ssim_window"], data_range=case.spec.largest_counts,
+                            truth=settings["truth"], model=model, readout=readout, seed=0)
+              for model in MODELS for readout, samples, predicted in formula_predictions(case, model)]
+    write_csv(outputs["scores"], pd.concat(frames)[COLUMNS])
+
+
+def learn(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Train networks on one model's maps of the indenters from several seeds, and score them on the objects.
+
+    inputs: as of `score_formulas`;  outputs: scores, curve (CSV: CURVE_COLUMNS, the compact network on growing shares)
+    settings: truth, model, learning (values of `config.Learning`), seed, ssim_window
+    """
+    from softtact.learning.training import prepare_torch
+
+    learning, case = settings["learning"], read_case(inputs)
+    device = prepare_torch(threads=threads, device=learning["device"])
+    work = _Work(case, settings, device)
+    write_csv(outputs["scores"], pd.concat(list(work.scores()))[COLUMNS])
+    write_csv(outputs["curve"], pd.DataFrame(list(work.curve()), columns=CURVE_COLUMNS))
+
+
+class _Work:
+    """The trainings of one model and truth."""
+
+    def __init__(self, case: Case, settings: dict[str, Any], device: Any) -> None:
+        self._case, self._settings, self._device = case, settings, device
+        self._learning, self._model = settings["learning"], settings["model"]
+        order = np.random.default_rng(settings["seed"]).permutation(case.indenters)
+        kept = min(max(1, round(self._learning["validation_share"] * len(order))), len(order) - 1)
+        self._validation = case.samples(self._model, list(order[:kept]), "validation")
+        self._training = list(order[kept:])
+        self._test = case.samples(self._model, case.objects, "test")
+
+    def scores(self) -> Iterator[pd.DataFrame]:
+        """Scores of each seed."""
+        for architecture in (COMPACT, PRINTED):
+            plan = self._learning[architecture]
+            for seed in range(plan["seeds"] if plan else 0):
+                yield self._trained(architecture, self._training, seed)[0]
+
+    def curve(self) -> Iterator[dict[str, Any]]:
+        """A row for each share of the training indenters, first ones of one order."""
+        for share in self._learning["curve"]:
+            chosen = self._training[:max(1, round(share * len(self._training)))]
+            scores, facts = self._trained(COMPACT, chosen, 0)
+            yield {"truth": self._settings["truth"], "model": self._model, "share": share, "indenters": len(chosen), **facts,
+                   "error_share": scores.error_share.mean(), "ssim_own_range": scores.ssim_own_range.mean()}
+
+    def _trained(self, architecture: str, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
+        """Scores of the best network of one training on some indenters, and what is known of the training."""
+        from softtact.learning.network import predict
+        from softtact.learning.settings import Training
+        from softtact.learning.training import start_run, train_network
+
+        plan, train = self._learning[architecture], self._case.samples(self._model, chosen, "train")
+        whole = max(1, math.ceil(len(self._training) * len(self._case.forces_n) / plan["batch"]))
+        steps = max(1, math.ceil(len(train) / plan["batch"]))
+        epochs = max(1, round(plan["epochs"] * whole / steps))     # as many steps for a share
+        options = Training(epochs=epochs, batch=plan["batch"], patience=epochs, learning_rate=plan["learning_rate"])
+        number = self._settings["seed"] + seed
+        run = start_run(train, network={"architecture": architecture}, learning_rate=plan["learning_rate"], seed=number,
+                        device=self._device)
+        label = f"{self._settings['truth']}/{self._model}, {architecture}, {len(chosen)} indenters, seed {seed}"
+        for _ in train_network(run, train, self._validation, options=options, ssim=self._ssim, seed=number, checkpoint=None,
+                               label=label):
+            pass
+        run.network.load_state_dict(run.best["weights"])
+        facts = {"maps": len(train), "best_epoch": run.best["epoch"], "epochs": run.epoch}
+        return self._scored(self._test, predict(run.network, self._test.maps_mm), architecture, seed), facts
+
+    @property
+    def _ssim(self) -> dict[str, Any]:
+        return {"window": self._settings["ssim_window"], "data_range": self._case.spec.largest_counts}
+
+    def _scored(self, samples: "Samples", predicted: np.ndarray, architecture: str, seed: int) -> pd.DataFrame:
+        return object_scores(samples, predicted, **self._ssim, truth=self._settings["truth"], model=self._model,
+                             readout=architecture, seed=seed)

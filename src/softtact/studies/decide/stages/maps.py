@@ -1,0 +1,109 @@
+"""The collapse of the lower feature's share, and the map of robustness."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from softtact.contact.height_field import HeightField
+from softtact.evaluation.curve_shape import lower_shares
+from softtact.evaluation.paired import compare, verdict
+from softtact.files import read_dataset, read_json, write_csv
+from softtact.geometry.meshes import place, read_mesh
+from softtact.sensors.frusta import SensorSpec
+from softtact.studies.decide.config import ELASTIC, ELECTRODES, FOUNDATION, HYPERELASTIC, MATCHED
+from softtact.studies.decide.pressing import press_item, sensor_of
+from softtact.studies.decide.scoring import fit_gain, ideal_of
+
+COLLAPSE_COLUMNS = ["family", "model", "young_mpa", "object", "step_mm", "force_n", "indentation_mm", "ratio", "lower_share"]
+_LEAST_OBJECTS = 3     # of a variant, whose verdict is of few objects and says so
+
+
+def trace_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Tabulate the lower feature's share against step over indentation, of all models and of elastic layers of other moduli.
+
+    inputs: objects (list), facts (list), presses_MODEL (lists), sensor, materials;  outputs: collapse (CSV: COLLAPSE_COLUMNS)
+    settings: young_mpa [further moduli], forces_n
+    family: elastic (read at the surface), electrodes, foundation, or hyperelastic
+    """
+    rows = []
+    elastic = {"kind": "elastic", "plane": "surface"}
+    sensors = {young: sensor_of(inputs["sensor"], elastic | {"young_mpa": young}) for young in settings["young_mpa"]}
+    for number, (path, facts) in enumerate(zip(inputs["objects"], inputs["facts"], strict=True)):
+        one = read_json(facts)
+        mesh = read_mesh(path, unit="mm")
+        presses = {name.removeprefix("presses_"): read_dataset(paths[number]) for name, paths in inputs.items()
+                   if name.startswith("presses_")}
+        presses |= {f"elastic {young:g} MPa": press_item(sensor, elastic, path, unit="mm", forces_n=settings["forces_n"])
+                    for young, sensor in sensors.items()}
+        heights = HeightField(place(mesh)).on_grid(*(next(iter(presses.values()))[axis].values for axis in ("x", "y")))
+        for name, press in presses.items():
+            rows += _shares(name, press, heights, one)
+    write_csv(outputs["collapse"], pd.DataFrame(rows, columns=COLLAPSE_COLUMNS))
+
+
+def _shares(name: str, press: Any, heights: np.ndarray, facts: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """A row for each valid load step of a press."""
+    linear = name in (ELASTIC, MATCHED) or name.startswith("elastic ")
+    family = ELASTIC if linear else name if name in (ELECTRODES, FOUNDATION) else HYPERELASTIC
+    young = float(name.split()[1]) if name.startswith("elastic ") else np.nan
+    shares = lower_shares(press.deformation_map_mm.values, heights, lower_mm=facts["step_mm"])
+    for step in np.flatnonzero((press.within_validity.values == 1) & np.isfinite(shares)):
+        depth = float(press.indentation_mm[step])
+        yield {"family": family, "model": name, "young_mpa": young, "object": facts["name"], "step_mm": facts["step_mm"],
+               "force_n": float(press.normal_force_n[step]), "indentation_mm": depth, "ratio": facts["step_mm"] / depth,
+               "lower_share": float(shares[step])}
+
+
+def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Tabulate, for each combination of a truth's law, K / mu0, tips and mesh, which tested model comes nearer to its counts.
+
+    inputs: variants (presses, the objects of one variant after those of the other), presses_elastic, presses_matched,
+    presses_hyperelastic (lists, of the objects), sensor;  outputs: robustness (CSV)
+    settings: variants [{law, bulk_over_shear, tips_bonded, mesh}, ...], objects, seed, statistics
+    Read by the gap formula, whose one gain is fitted to the other objects. Of few objects: an orientation, no test.
+    """
+    spec, count = SensorSpec.from_yaml(inputs["sensor"]), len(settings["objects"])
+    tested = {model: [read_dataset(path) for path in inputs[f"presses_{model}"]] for model in (ELASTIC, MATCHED, HYPERELASTIC)}
+    rows = []
+    for number, varied in enumerate(settings["variants"]):
+        truths = [read_dataset(path) for path in inputs["variants"][number * count:(number + 1) * count]]
+        errors = {model: _errors(spec, truths, presses) for model, presses in tested.items()}
+        row = varied | {"objects": count} | {f"error_{model}": float(np.nanmean(values)) for model, values in errors.items()}
+        for other in (ELASTIC, MATCHED):
+            row |= _nearer(errors[other] - errors[HYPERELASTIC], f"over_{other}", settings)
+        rows.append(row)
+    write_csv(outputs["robustness"], pd.DataFrame(rows))
+
+
+def _nearer(gain: np.ndarray, name: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns on what the hyperelastic model errs less (object,): mean, interval, and which of the two is nearer."""
+    gain = gain[np.isfinite(gain)]
+    if not len(gain):
+        return {f"gain_{name}": np.nan, f"low_{name}": np.nan, f"high_{name}": np.nan, f"verdict_{name}": "undecided"}
+    found = compare(gain, seed=settings["seed"])
+    word = verdict(found.p_above, found.p_below, objects=found.objects, least_objects=_LEAST_OBJECTS,
+                   level=settings["statistics"]["level"])
+    return {f"gain_{name}": found.mean, f"low_{name}": found.low, f"high_{name}": found.high, f"verdict_{name}": word}
+
+
+def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any]) -> np.ndarray:
+    """Errors over the readings (object,) of the gap formula, its gain fitted to the others; nan without a valid load step."""
+    pairs = [_counts(spec, truth, press) for truth, press in zip(truths, presses, strict=True)]
+    errors = np.full(len(pairs), np.nan)
+    for k, (true, ideal) in enumerate(pairs):
+        others = [pair for other, pair in enumerate(pairs) if other != k and len(pair[0])] or [(true, ideal)]
+        gain = fit_gain(np.concatenate([one for _, one in others]), np.concatenate([one for one, _ in others]))
+        if len(true):
+            errors[k] = np.abs(gain * ideal - true).sum() / true.sum()
+    return errors
+
+
+def _counts(spec: SensorSpec, truth: Any, press: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Ideal counts (n, row, column) of a truth and of a tested model at the forces of the truth at which both hold."""
+    forces = press.normal_force_n.values
+    places = [int(np.argmin(np.abs(forces - force))) for force in truth.normal_force_n.values]
+    valid = (truth.within_validity.values == 1) & (press.within_validity.values[places] == 1)
+    return (ideal_of(spec, truth.deformation_map_mm.values[valid]),
+            ideal_of(spec, press.deformation_map_mm.values[places][valid]))

@@ -1,0 +1,55 @@
+"""The page of the study."""
+
+from typing import Any
+
+import pandas as pd
+
+from softtact.reporting.page import Page
+
+CAPTIONS = {
+    "maps": "Maps of {shown} by the truths and the tested models, each with its own scale.",
+    "scores": "Error over the mean reading of every contestant, in the mean over smooth (pale) and stepped objects; bars: 95 % "
+              "intervals, objects and seeds drawn with replacement. Ceiling and flipped are controls: a tested model is the truth.",
+    "collapse": "The collapse: what a map shows of the lower feature against step height over indentation, at all forces. Crosses: "
+                "elastic layers of all moduli, and the foundation model; circles: hyperelastic.",
+    "learning_curve": "Error of the compact network trained on growing shares of the indenters, with as many steps for each.",
+    "robustness": "What the hyperelastic model errs less than the elastic ones against truths of every combination; few objects, "
+                  "gap formula. Right of zero the hyperelastic model is nearer; grey: undecided.",
+}
+_TITLES = {"power": "Power, stated before the scores", "robustness": "Map of robustness", "learning_curve": "Learning curves"}
+_MOST_ROWS = 60
+
+
+def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the page.
+
+    inputs: scores, hypotheses, learning_curve, power, robustness, collapse, claims (CSV), figures (list);  outputs: page
+    settings: study, names (of the figures), shown (the object of the maps), config
+    """
+    tables = {name: pd.read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items() if name != "figures"}
+    page = Page("Does the paper's claim hold? The study", settings["study"], folder=outputs["page"].parent)
+    page.box("What is synthetic here.", "Truths are simulations with other laws, meshes and boundaries than the tested models; "
+             "readings are the virtual sensor's. No score here is the paper's.")
+    page.claims(tables["claims"], file=inputs["claims"])
+    page.section("Hypotheses")
+    page.text("More is better in every difference. Intervals are those of 95 %; p_holm shares the level over all tests of a claim.")
+    page.table(tables["hypotheses"], file=inputs["hypotheses"])
+    page.section("Figures")
+    captions = [CAPTIONS[name].format(shown=settings["shown"].replace("_", " ")) for name in settings["names"]]
+    page.figures(zip(inputs["figures"], captions, strict=True))
+    page.section("Scores")
+    page.text("Means over objects and seeds. error_share: sum of the errors over the sum of the readings; ssim_own_range: data "
+              "range of each map; ssim_paper and ssim_paper_whole: the converter's range, with the smallest and the largest window "
+              "that fits, for the paper states none.")
+    page.table(mean_scores(tables["scores"]), file=inputs["scores"])
+    for name, title in _TITLES.items():
+        page.table(tables[name].head(_MOST_ROWS), title, file=inputs[name])
+    page.section("Configuration")
+    page.code(settings["config"])
+    page.write(outputs["page"])
+
+
+def mean_scores(scores: pd.DataFrame) -> pd.DataFrame:
+    """A row for each truth, readout, kind of object and contestant: means over objects and seeds."""
+    names = ["error_share", "ssim_own_range", "ssim_paper", "ssim_paper_whole"]
+    return scores.groupby(["truth", "readout", "kind", "model"], sort=False)[names].mean().reset_index()

@@ -1,0 +1,169 @@
+"""The study that decides: its objects, its choice of what is tested, and verdicts that follow from simulated scores."""
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from softtact.contact.height_field import HeightField
+from softtact.errors import InputError
+from softtact.evaluation.claim_rows import NOT, REPRODUCED, UNDECIDED
+from softtact.evaluation.curve_shape import lower_shares
+from softtact.geometry.generated import draw_objects
+from softtact.studies.decide.claims import claims_of_decision
+from softtact.studies.decide.config import MODELS, load_study, read_values
+from softtact.studies.decide.hypotheses import Tables, hypothesis_table, shown_objects
+from softtact.studies.decide.policies import policy_scores
+from softtact.studies.decide.scoring import COLUMNS, fit_gain
+from softtact.studies.decide.stages.judging import with_flatness
+
+STEPPED = draw_objects(0, 4, steps_mm=(0.1, 0.8), side_mm=22.0, seed=5)
+STATISTICS = read_values("config/decide.yaml")["statistics"]
+SEEDS = range(3)
+
+
+@pytest.mark.parametrize("made", STEPPED, ids=lambda made: made.name)
+def test_the_lower_feature_stands_back_by_the_stated_step(made):
+    """The object's underside has two levels, apart by the step to the rounding of single precision."""
+    mesh = made.mesh()
+    grid = np.linspace(-12, 12, 241)
+    heights = HeightField(mesh).on_grid(grid, grid)
+    below = np.sort(heights[heights < 0.9])
+    levels, counts = np.unique(below.round(3), return_counts=True)
+    low, high = sorted(levels[np.argsort(counts)[-2:]])
+    assert (low, high) == pytest.approx((0.0, made.step_mm), abs=1e-3)
+    assert mesh.is_watertight and mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_steps_are_spread_over_their_range():
+    assert [made.step_mm for made in STEPPED] == pytest.approx([0.1, 0.333, 0.567, 0.8])
+
+
+def test_another_mesh_of_an_object_has_more_points_and_the_same_surface():
+    """Facets are split and not moved: heights agree to the rounding of single precision."""
+    made, grid = STEPPED[1], np.linspace(-6, 6, 41)
+    coarse, fine = made.mesh(), made.mesh(edge_length_mm=1.0)
+    assert len(fine.faces) > 3 * len(coarse.faces)
+    assert HeightField(fine).on_grid(grid, grid) == pytest.approx(HeightField(coarse).on_grid(grid, grid), abs=1e-4, nan_ok=True)
+
+
+def test_the_same_seed_draws_the_same_objects_and_another_one_others():
+    draw = {seed: draw_objects(2, 2, steps_mm=(0.1, 0.8), side_mm=22.0, seed=seed) for seed in (1, 2)}
+    assert draw[1] == draw_objects(2, 2, steps_mm=(0.1, 0.8), side_mm=22.0, seed=1) != draw[2]
+
+
+def test_the_share_of_a_lower_feature_is_the_ratio_of_the_means():
+    """By hand: 0.2 mm under the feature that is 0.4 mm higher, 0.5 mm under the other; nan beside the object does not count."""
+    heights = np.array([[0.0, 0.4, np.nan]])
+    assert lower_shares(np.array([[[0.5, 0.2, 0.1]]]), heights, lower_mm=0.4) == pytest.approx([0.4])
+    assert np.isnan(lower_shares(np.array([[[0.5, 0.2, 0.1]]]), heights, lower_mm=0.2)).all()
+
+
+def test_one_gain_is_that_of_least_squares():
+    assert fit_gain(np.array([1.0, 2.0]), np.array([2.0, 4.0])) == pytest.approx(2.0)
+
+
+def simulated(gain, *, objects=12, scatter=0.01, seed=0):
+    """Scores of both models on stepped and smooth objects; the hyperelastic one errs by `gain` less on stepped ones."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for kind, number in itertools.product(("smooth", "stepped"), range(objects)):
+        hard = 0.02 * rng.standard_normal()
+        for model in MODELS:
+            better = gain * (kind == "stepped") * (model == "hyperelastic") + scatter * rng.standard_normal()
+            for seed_of_training in SEEDS:
+                error = 0.2 + hard - better + 0.001 * rng.standard_normal()
+                names = ["a", model, "compact", seed_of_training, f"{kind}_{number:02d}", kind, 8]
+                rows.append(dict(zip(COLUMNS, [*names, error, *[1 - error] * 3], strict=True)))
+    return pd.DataFrame(rows)
+
+
+def tables_of(scores, *, shown=0.9):
+    """The tables for a rule that gives stepped objects to the hyperelastic model, which takes 100 s, and the elastic one 1 s."""
+    names = sorted(scores.object.unique())
+    rule = ["hyperelastic" if name.startswith("stepped") else "elastic" for name in names]
+    choices = pd.DataFrame({"object": names, "step_mm": 0.3, "rule": rule, "rules": [f"{one} {one}" for one in rule],
+                            "by_error": rule, "share_hyperelastic": [float(one == "hyperelastic") for one in rule],
+                            "time_elastic_s": 1.0, "time_foundation_s": 2.0, "load_per_core": 1.0,
+                            "time_hyperelastic_s": 100.0 + np.arange(len(names))})
+    curves = (("elastic", "elastic", 0.2), ("hyperelastic", "a", shown))
+    collapse = pd.DataFrame([{"family": family, "model": model, "object": name, "force_n": 50.0, "ratio": ratio,
+                              "lower_share": share} for name in names for family, model, share in curves for ratio in (0.5, 1.0)])
+    power = pd.DataFrame({"claim": ["detail"], "power": [0.9]})
+    return Tables(pd.concat([scores, policy_scores(scores, choices)]), choices, collapse, power)
+
+
+def verdicts(tables):
+    table = hypothesis_table(tables, statistics=STATISTICS, truths=["a"], seed=0)
+    return {claim: set(own.verdict) for claim, own in table.groupby("claim")}
+
+
+def test_a_clear_effect_holds_and_its_flipped_sign_fails():
+    found, flipped = (verdicts(tables_of(simulated(gain))) for gain in (0.05, -0.05))
+    assert found["detail"] == found["detail_more"] == found["not_stiffness"] == found["choice"] == {"holds"}
+    assert flipped["detail"] == {"fails"} and flipped["choice"] == {"fails"}
+
+
+def test_no_effect_is_undecided():
+    found = verdicts(tables_of(simulated(0.0)))
+    assert found["detail"] == found["choice"] == {"undecided"}
+
+
+def test_a_truth_without_the_detail_decides_nothing_on_details():
+    found = verdicts(tables_of(simulated(0.05), shown=0.1))
+    assert found["detail"] == {"undecided"} and found["choice"] == {"holds"}
+
+
+def test_few_objects_are_undecided():
+    assert all(words == {"undecided"} for words in verdicts(tables_of(simulated(0.05, objects=4))).values())
+
+
+def test_half_of_the_objects_at_a_hundredth_of_the_time_costs_half_and_is_not_told_from_it():
+    """The hybrid takes 50.5 % of the time where half of the objects are elastic: no more than the scatter above one half."""
+    assert verdicts(tables_of(simulated(0.05)))["cost"] == {"undecided"}
+
+
+def test_shown_objects_are_counted_at_the_largest_force():
+    table = pd.DataFrame({"model": "a", "object": ["one", "one", "two", "two"], "force_n": [10.0, 50.0, 10.0, 50.0],
+                          "lower_share": [0.1, 0.4, 0.5, 0.2]})
+    assert shown_objects(table, share=0.3) == {"a": 1}
+
+
+def test_chance_scores_between_the_models_and_the_oracle_at_least_as_well_as_each():
+    scores = simulated(0.05)
+    table = tables_of(scores).scores.groupby("model").error_share.mean()
+    assert table["random"] == pytest.approx(0.5 * (table["elastic"] + table["hyperelastic"]))
+    assert table["oracle"] <= min(table["elastic"], table["hyperelastic"], table["hybrid"])
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(0.05, REPRODUCED), (-0.05, NOT), (0.0, UNDECIDED)])
+def test_the_claims_follow_the_tests(gain, verdict):
+    tables = tables_of(simulated(gain))
+    table = hypothesis_table(tables, statistics=STATISTICS, truths=["a"], seed=0)
+    curve = with_flatness(pd.DataFrame({"truth": "a", "model": "elastic", "share": [0.5, 1.0], "indenters": [20, 40],
+                                        "error_share": [0.2, 0.199]}))
+    claims = claims_of_decision({"hypotheses": table, "collapse": tables.collapse, "learning_curve": curve}, statistics=STATISTICS,
+                                truths=["a"], printed=False)
+    assert claims.verdict.iloc[0] == verdict
+    assert claims.verdict.iloc[-1] == REPRODUCED      # the curve's last step is 0.5 %
+
+
+def test_a_learning_curve_that_still_falls_is_not_flat():
+    curve = pd.DataFrame({"truth": "a", "model": "elastic", "share": [0.5, 1.0], "error_share": [0.2, 0.15]})
+    assert not with_flatness(curve).flat.any()
+
+
+def test_models_that_the_hypotheses_need_must_be_there():
+    values = read_values("config/decide.yaml")
+    del values["models"]["matched"]
+    with pytest.raises(InputError, match="models has no 'matched'"):
+        load_study(values, "mine.yaml")
+
+
+def test_the_truths_of_the_default_study_differ_from_the_tested_model_in_law_and_mesh():
+    study = load_study(read_values("config/decide.yaml"), "config/decide.yaml")
+    tested = study.values.models["hyperelastic"]
+    for truth in study.values.truths.values():
+        assert (truth.law, truth.bulk_over_shear) != (tested.law, tested.bulk_over_shear) and truth.mesh != tested.mesh
+    assert len(study.objects) >= 24 and len(study.indenters) >= 49
