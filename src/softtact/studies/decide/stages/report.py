@@ -20,7 +20,7 @@ _TITLES = {"power": "Power, stated before the scores", "robustness": "Map of rob
 _MOST_ROWS = 60
 
 
-def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the page.
 
     inputs: scores, hypotheses, learning_curve, power, robustness, collapse, claims (CSV), figures (list);  outputs: page
