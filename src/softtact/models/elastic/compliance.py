@@ -86,13 +86,13 @@ class Compliance:
 
 @dataclass(frozen=True)
 class InnerPlaneCompliance(Compliance):
-    """A `Compliance` whose maps are of a plane inside the layer, to which its `lower` belongs; contact is that of the top."""
+    """A `Compliance` whose fields are of a plane inside the layer, to which its `lower` belongs; contact is that of the top."""
 
-    def maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
-        """Deformation maps (l, ny, nx) in mm of the plane."""
-        return self._maps(self.lower, points, force)
+    def fields(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
+        """Deformation (l, 2 ny - 1, 2 nx - 1) in mm of the plane at all nodes."""
+        return self._fields(self.lower, points, force)
 
-    def lower_maps(self, points: ObjectPoints, force: np.ndarray) -> None:
+    def lower_fields(self, points: ObjectPoints, force: np.ndarray) -> None:
         """None: the layer's lower side is fixed."""
         return None
 
