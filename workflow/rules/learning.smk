@@ -360,7 +360,10 @@ if CURVES:
         params:
             files=files,
             settings=as_settings(
-                architecture=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
+                architecture=STUDY.values.network.architecture,
+                tested=STUDY.tested,
+                reference=STUDY.values.reference,
+                source=STUDY.source,
             ),
         shell:
             run_stage("find_limits")

@@ -78,7 +78,8 @@ def draw_objects(smooth: int, stepped: int, *, steps_mm: Sequence[float], side_m
 
     steps_mm: [least, most] height of a step: those of the stepped objects are spread evenly over it
     """
-    steps = np.linspace(*steps_mm, stepped) if stepped > 1 else np.full(stepped, np.mean(steps_mm))
+    least, most = steps_mm
+    steps = np.linspace(least, most, stepped) if stepped > 1 else np.full(stepped, 0.5 * (least + most))
     return [*(draw_cap(f"smooth_{k + 1:02d}", side_mm=side_mm, seed=[seed, 0, k]) for k in range(smooth)),
             *(draw_stepped(f"stepped_{k + 1:02d}", float(np.round(step, 3)), side_mm=side_mm, seed=[seed, 1, k])
               for k, step in enumerate(steps))]
@@ -88,7 +89,8 @@ def draw_cap(name: str, *, side_mm: float, seed: Sequence[int]) -> GeneratedObje
     """A smooth object: one convex cap."""
     rng, scale = np.random.default_rng(seed), side_mm / _SIDE_MM
     length, width = (scale * rng.uniform(*_CAP_SIDE, 2)).round(2)
-    radii = (scale * np.exp(rng.uniform(*np.log(_CAP_RADIUS), 2))).round(1)
+    least, most = np.log(_CAP_RADIUS)
+    radii = (scale * np.exp(rng.uniform(least, most, 2))).round(1)
     turn = round(float(rng.uniform(-_TURN_DEG, _TURN_DEG)), 1)
     cap = Feature(0.0, 0.0, float(length), float(width), 0.0, (float(radii[0]), float(radii[1])))
     return GeneratedObject(name, 0.0, turn, (cap,))

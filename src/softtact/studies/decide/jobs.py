@@ -60,7 +60,7 @@ class _Jobs:
                   "rule": self.values.rule}
         outputs = {"mesh": f"{self.folder}/objects/{{item}}.stl", "facts": f"{self.folder}/objects/{{item}}.json"}
         return [Job("draw_object", {}, outputs, {"object": asdict(item.made), "edges_mm": self._edges(item), **common},
-                    {"item": item.id}) for item in self.study.objects]
+                    {"item": item.id}) for item in self.study.objects if item.made is not None]
 
     def _edges(self, item):
         """The longest edges of an object's meshes, drawn from the seed and its name."""
@@ -149,7 +149,7 @@ class _Jobs:
         power = Job("state_power", {}, {"power": table["power"]},
                     {"statistics": statistics, **values.objects.model_dump(include={"smooth", "stepped"}),
                      "seeds": values.learning.compact.seeds, "tests": self._tests()})
-        gathered = Job("gather_scores", {"formulas": [job.made()["scores"] for job in scored],
+        gathered = Job("gather_scores", {"formulas": [str(job.made()["scores"]) for job in scored],
                                          "networks": [f"{name}.csv" for name in networks],
                                          "curves": [f"{name}_curve.csv" for name in networks], "facts": self.facts(),
                                          **{f"presses_{model}": self.presses(model, self.study.objects) for model in MODELS},

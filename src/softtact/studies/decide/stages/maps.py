@@ -27,7 +27,7 @@ def trace_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     settings: young_mpa [further moduli], forces_n
     family: elastic (read at the surface), electrodes, foundation, or hyperelastic
     """
-    rows = []
+    rows: list[dict] = []
     elastic = {"kind": "elastic", "plane": "surface"}
     sensors = {young: sensor_of(inputs["sensor"], elastic | {"young_mpa": young}) for young in settings["young_mpa"]}
     for number, (path, facts) in enumerate(zip(inputs["objects"], inputs["facts"], strict=True)):

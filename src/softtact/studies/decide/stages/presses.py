@@ -33,10 +33,11 @@ def draw_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
         mesh = made.mesh(edge_length_mm=edge)
         if number == 0:
             with atomic_path(outputs["mesh"]) as temporary:
-                temporary.write_bytes(mesh.export(file_type="stl"))
+                mesh.export(temporary, file_type="stl")
         counts = score(place(mesh).triangles, footprint_mm=settings["footprint_mm"], reach_mm=settings["reach_mm"])
-        four = {name: int(getattr(counts, name)) for name in ("NPt", "CHt", "NPo", "CHo")}
-        meshes.append({"edge_mm": edge, **four, "model": choose_model(**four, **settings["rule"])})
+        four: dict[str, Any] = {name: int(getattr(counts, name)) for name in ("NPt", "CHt", "NPo", "CHo")}
+        chosen = choose_model(**(four | settings["rule"]))
+        meshes.append({"edge_mm": edge, **four, "model": chosen})
     write_json(outputs["facts"], {"name": made.name, "step_mm": made.step_mm, "meshes": meshes})
 
 
