@@ -24,8 +24,7 @@ import yaml
 from PIL import Image
 
 from softtact.errors import InputError
-from softtact.evaluation.claim_rows import ARCHIVE, CONSISTENT, CONTRADICTION, MEASUREMENTS, UNDECIDED
-from softtact.evaluation.decisions import LEAST_OBJECTS
+from softtact.evaluation.decisions import ARCHIVE, CONSISTENT, CONTRADICTION, LEAST_OBJECTS, MEASUREMENTS, UNDECIDED
 from softtact.evaluation.policies import with_chance
 from softtact.files import read_yaml
 from softtact.reporting.run_record import run_record, run_sentence
@@ -65,7 +64,7 @@ NOTES = {
                 "presses of each model as the paper's rule. Times are of one machine, with what else ran there.",
     "Scores of the networks": "Maps are readings of few presses: those of one press differ by noise and drift alone."}
 CLAIMS, GAPS = "tables/claims.csv", "tables/gaps.csv"
-RULES = ("src/softtact/studies/hybrid/claims/", "src/softtact/evaluation/decisions.py", "src/softtact/evaluation/claim_rows.py")
+RULES = ("src/softtact/studies/hybrid/claims/", "src/softtact/evaluation/decisions.py")
 NOT_AGAIN = "not judged again"
 MATERIALS = ROOT / "src/softtact/sensors/data/materials"
 

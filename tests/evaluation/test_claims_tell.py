@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from softtact.evaluation.claim_rows import within
+from softtact.evaluation.decisions import within
 from softtact.skin.elastomers import read_elastomers
 from softtact.skin.layout import module_layout
 from softtact.studies.grasps.claims import claims_of_grasps

@@ -2,7 +2,7 @@
 
 import pytest
 
-from softtact.evaluation.claim_rows import CONTRADICTION, MEASUREMENTS, REPRODUCED
+from softtact.evaluation.decisions import CONTRADICTION, MEASUREMENTS, REPRODUCED
 from softtact.skin.elastomers import read_elastomers
 from softtact.studies.skin.claims import claims_of_skin
 

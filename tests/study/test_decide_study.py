@@ -8,8 +8,8 @@ import pytest
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
-from softtact.evaluation.claim_rows import NOT, REPRODUCED, UNDECIDED
 from softtact.evaluation.curve_shape import lower_shares
+from softtact.evaluation.decisions import NOT, REPRODUCED, UNDECIDED
 from softtact.geometry.generated import draw_objects
 from softtact.studies.decide.claims import claims_of_decision
 from softtact.studies.decide.config import MODELS, load_study, read_values

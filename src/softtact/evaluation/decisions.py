@@ -1,4 +1,4 @@
-"""The one rule by which every claim on a population is decided: an interval over objects that is clear of the claim's limit.
+"""Rows and verdicts of claims, and the rule that decides each on a population: an interval over objects clear of its limit.
 
 The unit is the object (or the indenter, tissue, recording): maps of one object are alike, so they add no evidence of their own. Two
 models are compared object by object, so what objects have in common cancels. A claim is decided where there are at least
@@ -18,8 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from softtact.evaluation.claim_rows import NOT, REPRODUCED, UNDECIDED
-
+REPRODUCED, NOT, CONTRADICTION, ARCHIVE = "reproduced", "not reproduced", "contradicts itself", "needs the archive"
+UNDECIDED, MEASUREMENTS = "undecided", "needs the paper's measurements"
+CONSISTENT = "consistent in print"      # the paper's numbers agree with each other; nothing of ours was compared
+FACTOR = 2.0                            # between times of two machines and solvers that count as equal, up or down; assumed
+COLUMNS = ["claim", "where", "paper", "ours", "uncertainty", "verdict", "rule", "evidence"]
 LEAST_OBJECTS = 6
 LEVEL = 0.95
 RULE = f"at least {LEAST_OBJECTS} objects, and the {100 * LEVEL:g} % interval over objects clear of the limit; else undecided"
@@ -134,6 +137,23 @@ def all_of(verdicts: Sequence[str]) -> str:
     if not verdicts:
         return UNDECIDED
     return next((verdict for verdict in (NOT, UNDECIDED) if verdict in verdicts), REPRODUCED)
+
+
+def row(claim: str, where: str, paper: str | float, ours: str | float, verdict: str, rule: str, evidence: str, *,
+        uncertainty: str = "not told") -> dict[str, str]:
+    """One row of a table of claims, by COLUMNS; all but the verdict is text for readers."""
+    values = (claim, where, str(paper), str(ours), uncertainty, verdict, rule, evidence)
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def verdict_of(condition: bool) -> str:
+    """The verdict `reproduced` or `not reproduced`."""
+    return REPRODUCED if condition else NOT
+
+
+def within(ours: float, printed: float, *, factor: float = FACTOR) -> bool:
+    """Whether a positive number is within a factor of the printed one, up or down."""
+    return bool(printed / factor <= ours <= printed * factor)
 
 
 def _finite(values):

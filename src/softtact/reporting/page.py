@@ -141,7 +141,7 @@ class Page:
                 self.table(pd.read_csv(files[name]).iloc[:most_rows], title, file=files[name])
 
     def claims(self, claims: pd.DataFrame, *, title: str = "The paper's claims", file: str | Path, links: Links = ()) -> None:
-        """The section of a study's claims (see `evaluation.claim_rows`), coloured by verdict, with links to their evidence."""
+        """The section of a study's claims (see `evaluation.decisions`), coloured by verdict, with links to their evidence."""
         counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
         self.section(title, anchor="claims")
         self.text(f"Each verdict is computed by the rule beside it: {len(claims)} claims, {counts}.",

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claim_rows import COLUMNS, NOT, REPRODUCED, UNDECIDED, row
+from softtact.evaluation.decisions import COLUMNS, NOT, REPRODUCED, UNDECIDED, row
 from softtact.evaluation.paired import FAILS, HOLDS
 from softtact.studies.decide.config import CONTROLS
 from softtact.studies.decide.hypotheses import shown_objects
@@ -33,7 +33,7 @@ _CONTROLS = [("ceiling", HOLDS, "Control: where the truth is the hyperelastic mo
 
 def claims_of_decision(tables: Mapping[str, pd.DataFrame], *, statistics: Mapping[str, Any], truths: list[str],
                        printed: bool) -> pd.DataFrame:
-    """Data frame with `claim_rows.COLUMNS`; tables: the study's, by name;  printed: whether the paper's network was trained."""
+    """Data frame with `decisions.COLUMNS`; tables: the study's, by name;  printed: whether the paper's network was trained."""
     hypotheses = tables["hypotheses"]
     rows = [_claim(claim, hypotheses[(hypotheses.claim == claim) & ~hypotheses.truth.isin(list(CONTROLS))]) for claim in _CLAIMS]
     shown = shown_objects(tables["collapse"], share=statistics["shown_share"])

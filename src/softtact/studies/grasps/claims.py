@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claim_rows import ARCHIVE, COLUMNS, UNDECIDED, row, verdict_of
+from softtact.evaluation.decisions import ARCHIVE, COLUMNS, UNDECIDED, row, verdict_of
 from softtact.studies.hybrid.claims.of_maps import LOWER_RULE
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _FORCE_SHARE = 0.01  # of the force asked for, within which pads press as asked
 def claims_of_grasps(
     grasps: pd.DataFrame, compared: Mapping[str, "xarray.Dataset"], *, force_n: float, policy: str, model: str
 ) -> pd.DataFrame:
-    """Data frame with `claim_rows.COLUMNS`.
+    """Data frame with `decisions.COLUMNS`.
 
     grasps: rows of grasps.csv;  compared: {object: data set of one_event};  model, policy: how the study takes a model
     """

@@ -9,8 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claim_rows import COLUMNS, UNDECIDED, row
-from softtact.evaluation.decisions import interval_inside
+from softtact.evaluation.decisions import COLUMNS, UNDECIDED, interval_inside, row
 
 PRINTED_N_MM = {"ecoflex_00_30": 55.218, "dragon_skin_20": 79.204}     # sec. IV, the slopes of figure 4
 _SOFT_FIRST = tuple(PRINTED_N_MM)
@@ -27,7 +26,7 @@ def of_the_paper(tissues: Iterable[str]) -> bool:
 
 def claims_of_probe(curves: pd.DataFrame, slopes: pd.DataFrame, hardness: pd.DataFrame | None, *,
                     mesh_error: float) -> pd.DataFrame:
-    """Data frame with `claim_rows.COLUMNS` from the tables of `softtact palpate`; empty for tissues that are not the paper's.
+    """Data frame with `decisions.COLUMNS` from the tables of `softtact palpate`; empty for tissues that are not the paper's.
 
     curves: a row for each step;  slopes: for each tissue and scenario;  hardness: over load and height, or None
     mesh_error: the largest relative change of a slope between this mesh and one half as fine

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.errors import ExtrapolationWarning
-from softtact.evaluation.claim_rows import COLUMNS, CONSISTENT, CONTRADICTION, MEASUREMENTS, row, verdict_of
+from softtact.evaluation.decisions import COLUMNS, CONSISTENT, CONTRADICTION, MEASUREMENTS, row, verdict_of
 from softtact.files import read_yaml
 from softtact.skin.analysis import Skin, mesh_convergence
 from softtact.skin.choice import SPECIMEN_MM, pareto, printed_criteria
@@ -27,7 +27,7 @@ _EXACT = "none: arithmetic of printed numbers"
 
 
 def claims_of_skin(elastomers: Mapping[str, Elastomer], *, threads: int = 1) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The claims by `claim_rows.COLUMNS`, and the table of the meshes' convergence on the authors' case."""
+    """The claims by `decisions.COLUMNS`, and the table of the meshes' convergence on the authors' case."""
     layout = module_layout()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExtrapolationWarning)

@@ -6,7 +6,7 @@ A row is `consistent in print`, `contradicts itself`, or `undecided` where what 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from softtact.evaluation.claim_rows import CONSISTENT, CONTRADICTION, UNDECIDED, row
+from softtact.evaluation.decisions import CONSISTENT, CONTRADICTION, UNDECIDED, row
 from softtact.published.archive import ALL_MAPS, MAPS_OF_SETS, PRINTED_SSIM
 
 if TYPE_CHECKING:

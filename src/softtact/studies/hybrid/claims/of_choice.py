@@ -6,8 +6,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claim_rows import CONSISTENT, CONTRADICTION, NOT, REPRODUCED, UNDECIDED, row, verdict_of
-from softtact.evaluation.decisions import LEAST_OBJECTS, RULE, above, all_of, below, inside, mean_over_objects, share_of_objects
+from softtact.evaluation.decisions import (
+    CONSISTENT,
+    CONTRADICTION,
+    LEAST_OBJECTS,
+    NOT,
+    REPRODUCED,
+    RULE,
+    UNDECIDED,
+    above,
+    all_of,
+    below,
+    inside,
+    mean_over_objects,
+    row,
+    share_of_objects,
+    verdict_of,
+)
 from softtact.learning.dataset import object_of
 
 if TYPE_CHECKING:

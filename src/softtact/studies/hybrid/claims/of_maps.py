@@ -5,8 +5,18 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claim_rows import ARCHIVE, UNDECIDED, row
-from softtact.evaluation.decisions import LEAST_OBJECTS, RULE, above, all_of, below, difference_of_groups, mean_over_objects
+from softtact.evaluation.decisions import (
+    ARCHIVE,
+    LEAST_OBJECTS,
+    RULE,
+    UNDECIDED,
+    above,
+    all_of,
+    below,
+    difference_of_groups,
+    mean_over_objects,
+    row,
+)
 from softtact.published.archive import SOURCE as PUBLISHED
 
 RELIEF, STEPPED = "object_4", ("object_5", "object_6")

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softtact.evaluation.claim_rows import ARCHIVE, CONTRADICTION, UNDECIDED, row
 from softtact.evaluation.decisions import (
+    ARCHIVE,
+    CONTRADICTION,
     LEAST_OBJECTS,
     RULE,
+    UNDECIDED,
     Estimate,
     above,
     all_of,
@@ -20,6 +22,7 @@ from softtact.evaluation.decisions import (
     inside,
     interval_inside,
     mean_over_objects,
+    row,
     wider_spread,
 )
 from softtact.evaluation.score_tables import ALL_FORCES

@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from softtact.evaluation.claim_rows import UNDECIDED, row, verdict_of
-from softtact.evaluation.decisions import LEAST_OBJECTS
+from softtact.evaluation.decisions import LEAST_OBJECTS, UNDECIDED, row, verdict_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,8 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from softtact.evaluation.claim_rows import ARCHIVE, CONSISTENT, CONTRADICTION, UNDECIDED, row, verdict_of
-from softtact.evaluation.decisions import interval_inside, known_within
+from softtact.evaluation.decisions import (
+    ARCHIVE,
+    CONSISTENT,
+    CONTRADICTION,
+    UNDECIDED,
+    interval_inside,
+    known_within,
+    row,
+    verdict_of,
+)
 from softtact.materials.consistency import FACTOR, largest_parting_in_tension, longest_common_test
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claim_rows import UNDECIDED, row
-from softtact.evaluation.decisions import RULE, above, mean_over_objects
+from softtact.evaluation.decisions import RULE, UNDECIDED, above, mean_over_objects, row
 from softtact.learning.dataset import object_of
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from softtact.evaluation.claim_rows import ARCHIVE, COLUMNS, MEASUREMENTS
+from softtact.evaluation.decisions import ARCHIVE, COLUMNS, MEASUREMENTS
 from softtact.evaluation.score_tables import untrained
 from softtact.published.archive import SOURCE as PUBLISHED
 from softtact.studies.hybrid.claims.in_print import claims_in_print
@@ -74,7 +74,7 @@ class Evidence:
 
 
 def claims(evidence: Evidence) -> pd.DataFrame:
-    """Data frame with `claim_rows.COLUMNS`, a row for each claim."""
+    """Data frame with `decisions.COLUMNS`, a row for each claim."""
     bad = None if evidence.scores is None else untrained(evidence.scores)
     rows = [*claims_of_materials(evidence.cards), *claims_of_dielectric(evidence.ftir),
             *claims_of_choice(evidence.complexity, choose=evidence.choose, printed_counts=evidence.printed_counts,
