@@ -60,11 +60,11 @@ advice: .venv/tested
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,mesh,excel,skin,robot,mkl]'
+	$(BIN)/python -m pip install --quiet --no-compile -c constraints.txt -e '.[workflow,learn,view,optics,mesh,excel,skin,robot,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[all,test,docs]'
+	$(BIN)/python -m pip install --quiet --no-compile -c constraints.txt -e '.[all,test,docs]'
 	touch $@
 
 # The documentation as a site, from docs/ into site/; a warning of Sphinx is an error.

@@ -199,6 +199,7 @@ def test_the_page_about_costs_is_short():
     assert (ROOT / "docs/performance.md").stat().st_size <= 4096 and (ROOT / "README.md").stat().st_size <= 5120
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
     pytest.importorskip("myst_parser", reason="pip install -e '.[docs]'")
     folders = ["-d", str(tmp_path / "trees"), str(ROOT / "docs"), str(tmp_path / "site")]

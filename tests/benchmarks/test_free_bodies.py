@@ -10,6 +10,8 @@ from softtact.fem.solid_block import SolidBlock
 from softtact.linalg.direct import PardisoSingle
 from softtact.materials.laws.registry import make_law
 
+pytestmark = pytest.mark.slow     # kernels that nothing else needs are compiled
+
 LAWS = {
     "mooney_rivlin": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=7.0),
     "yeoh": make_law("yeoh", {"c10": 0.18, "c20": -0.01, "c30": 0.004}, bulk_modulus=7.0),

@@ -305,6 +305,7 @@ def test_a_law_used_outside_its_card_warns_and_inside_it_does_not(card, recwarn)
         law.nominal_stress("uniaxial", np.array([1.0, 3.0]))
 
 
+@pytest.mark.slow
 def test_silicones_are_fitted_up_to_a_strain_of_100_percent(published):
     """The chosen law is stable there and leaves a share of the largest stress: measured 0.2 to 0.5 %, and 1.2 and 2.7 % with the
     Ecoflex', whose 15 to 25 kPa were read with a load cell of 1 kN.

@@ -50,7 +50,7 @@ def test_a_plate_wider_than_a_pad_whose_shell_is_flush_presses_the_shell_alone(m
     assert np.isnan(result.torque_nmm).all()
 
 
-@pytest.mark.parametrize("model", ["elastic", "hyperelastic"])
+@pytest.mark.parametrize("model", ["elastic", pytest.param("hyperelastic", marks=pytest.mark.slow)])
 def test_a_plate_sinks_until_it_rests_and_the_shell_carries_what_is_added(model):
     sensor = with_edge(SidesBelow(sides_below_mm=0.05))
     with pytest.warns(ShellWarning, match="sides held from 0.05 mm below the surface on"):

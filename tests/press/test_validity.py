@@ -62,6 +62,7 @@ def test_an_object_whose_top_has_sunk_in_is_flagged(height, expected):
     assert result.indentation_mm[0] > 0.1 and result.within_validity[0] == expected
 
 
+@pytest.mark.slow
 def test_the_load_steps_before_a_force_that_is_not_reached_are_flagged_alike():
     disc = trimesh.creation.cylinder(radius=1.8, height=0.1, sections=64)
     sensor = Sensor(SMALL, LAWS, mesh=COARSE, solver=NewtonSettings(smallest_increment_n=100))     # so no smaller step is tried

@@ -242,6 +242,7 @@ def elastic(body, state):
     return state.energy - float(top + board)
 
 
+@pytest.mark.slow
 def test_the_more_friction_the_smaller_the_indentation_between_free_and_bonded_tips(record):
     source, forces, coefficients = "the press with less friction", [1.0, 2.0], (0.0, 0.1, 0.2, 0.4, 0.8)
     bodies = [*(body_with(board=mu, columns=3, rows=3) for mu in coefficients), body_with(held=True, columns=3, rows=3)]
@@ -377,6 +378,7 @@ def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
     assert abs(top - aside) < 2e-3 * depth
 
 
+@pytest.mark.slow
 def test_a_punch_with_friction_needs_more_force_than_one_without(record):
     """Poisson's ratio 0, where it is most: 4 G a depth ln(3 - 4 nu) / (1 - 2 nu) against 4 G a depth / (1 - nu)."""
     expected, source = np.log(3.0), "Mossakovskii 1954; Johnson, Contact Mechanics, eq. (3.104)"
