@@ -327,6 +327,7 @@ def test_press_refuses_a_card_that_it_cannot_use(refused):
         assert status == 1 and sentence in said, card
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", ["calculix", "abaqus"])
 def test_export_deck_writes_the_whole_sensor_with_a_step_per_force(answer, tmp_path, dialect):
     deck = tmp_path / "deck.inp"

@@ -64,6 +64,7 @@ def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(folder, cap
     assert sentence in capsys.readouterr().err and set(folder.iterdir()) == before
 
 
+@pytest.mark.slow
 def test_calibrate_tells_how_far_the_hyperelastic_model_lies_from_the_calibrated_sensor(folder, capsys):
     line = (f"calibrate bar.csv --press bar.stl --force bar_force.csv --place=-0.8,-1.2,0 {OPTIONS} "
             "--hyperelastic-check --json")
@@ -77,6 +78,7 @@ def test_calibrate_tells_how_far_the_hyperelastic_model_lies_from_the_calibrated
     assert told["hyperelastic_difference_counts"][0] > 100      # the elastic model is of the surface, not of the electrodes' plane
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bar.png", "bar.gif", "bar.mp4"])
 def test_view_plays_a_recording(folder, capsys, name):
     iio = pytest.importorskip("imageio.v3")

@@ -89,6 +89,7 @@ def finished(tmp_path_factory):
     return folder, inputs, run_evaluation(folder, inputs)
 
 
+@pytest.mark.slow
 def test_the_history_has_a_row_per_epoch_and_no_wall_time(finished):
     history = pd.read_csv(finished[0] / "learning/elastic/history.csv")
     assert history.columns.tolist() == ["epoch", "train_loss", "validation_loss", "validation_ssim", "learning_rate"]

@@ -75,6 +75,7 @@ def search_in_a_process(journal, trials, started=None):
     search(Path(journal), trials=trials)
 
 
+@pytest.mark.slow
 def test_processes_share_a_search_and_end_with_the_same_table(tmp_path):
     spawn = multiprocessing.get_context("spawn")
     other = spawn.Process(target=search_in_a_process, args=(tmp_path / "search.journal", 8))

@@ -16,6 +16,7 @@ def functionals(count, size, *, width):
     return sp.csr_matrix((RNG.uniform(-1, 1, len(places)), (rows, places)), shape=(count, size))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "width"), [(1, 1), (90, 1), (90, 12), (2500, 2)])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_it_is_what_the_dense_inverse_gives(count, width, threads):

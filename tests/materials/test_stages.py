@@ -47,6 +47,7 @@ def test_two_materials_have_different_noise_under_one_seed(polyurethane, tmp_pat
     assert one.read_text() != two.read_text()
 
 
+@pytest.mark.slow
 def test_the_default_materials_card_has_the_law_that_made_its_curves(polyurethane, tmp_path):
     """Three standard errors of 1 % noise: the fit must not only be near, it must know how near."""
     paths = make(polyurethane, tmp_path)

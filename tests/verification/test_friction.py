@@ -187,6 +187,7 @@ def rough_press():
     return body, list(ball_on(body, np.linspace(0.5, 4.0, 15)))
 
 
+@pytest.mark.slow
 def test_no_point_carries_more_than_coulomb_allows_and_sliding_ones_carry_all_of_it(rough_press, record):
     body, load_steps = rough_press
     for name, part, state in (("top", body.slab.top, load_steps[-1].state.slab),
@@ -218,6 +219,7 @@ def dissipated(body, load_steps):
     return np.array(work)
 
 
+@pytest.mark.slow
 def test_work_is_stored_or_dissipated(record):
     """Conservation of energy between two states that friction has already shaped."""
     source, errors = "energy stored in rubber and contacts, and friction's work: conservation of energy", []

@@ -210,6 +210,7 @@ def test_a_flat_punch_on_the_slab_follows_the_closed_form_and_better_on_a_finer_
     assert errors[1] < 0.6 * errors[0] and errors[1] < 0.05      # first order: the stress is singular at the punch's edge
 
 
+@pytest.mark.slow
 def test_a_layered_half_space_lies_between_its_materials_and_equals_each_in_its_limit(record):
     soft, hard = linear_law(YOUNG), linear_law(3 * YOUNG)
     source = "Hertz with the one material; in between, bounds"

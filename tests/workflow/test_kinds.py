@@ -14,6 +14,8 @@ from softtact.studies.code_closure import code_closure
 from softtact.studies.jobs import paths_of, stage_source
 from softtact.studies.registry import KINDS, open_study
 
+pytestmark = pytest.mark.slow     # each test plans a whole study with Snakemake, which takes seconds
+
 
 @dataclass(frozen=True)
 class Case:

@@ -5,6 +5,8 @@ import pytest
 from softtact.studies.code_closure import code_closure
 from softtact.studies.jobs import stage_source, stages_of
 
+pytestmark = pytest.mark.slow     # each test plans a whole study with Snakemake, which takes seconds
+
 FIGURES = [stage.partition(".")[2] for stage in stages_of("hybrid") if stage.startswith("hybrid.draw_")]
 SIMULATION = {"make_curves", "fit_material", "mesh_sensor", "precompute_compliance", "simulate_press"}
 LEARNING = {"search_hyperparameters", "train_cnn", "evaluate"}

@@ -6,6 +6,8 @@ import pytest
 from project import Project
 from small_archive import Archive
 
+pytestmark = pytest.mark.slow     # each test plans a whole study with Snakemake, which takes seconds
+
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):

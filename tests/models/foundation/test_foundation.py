@@ -224,6 +224,7 @@ def test_a_load_step_whose_patches_have_all_let_go_is_not_reached_and_nothing_is
     assert press.load_step(state, 1.0) == (None, 1)
 
 
+@pytest.mark.slow
 def test_the_object_holds_nodes_beside_its_edge_as_softly_as_its_edge_reaches_where_they_have_moved_to(compliance, whole):
     """Depth less gap and softness times force is how far the whole slab comes down there; the softness by the movement found."""
     points = points_of(PUNCH, compliance)

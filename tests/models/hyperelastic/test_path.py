@@ -65,6 +65,7 @@ def test_a_plate_that_slides_is_held_by_the_coefficient_times_the_force():
     assert np.nanmean(np.diff(result.slip[:, 3:6, 3:6], axis=0)[-1]) == pytest.approx(0.2, rel=0.06)
 
 
+@pytest.mark.slow
 def test_a_path_that_returns_dissipates_and_one_that_sticks_does_not():
     """Work of the object along x over a closed path: friction takes what sliding points lose, and sticking ones give all back."""
     def loop(mu, way):
@@ -78,6 +79,7 @@ def test_a_path_that_returns_dissipates_and_one_that_sticks_does_not():
     assert lost > 0.5 * scale and abs(kept) < 0.05 * stuck_scale
 
 
+@pytest.mark.slow
 def test_the_end_depends_on_the_path_with_friction_and_not_without():
     def end(mu, before):
         motion = Motion().step(ways={"x": before}) if before else Motion()
