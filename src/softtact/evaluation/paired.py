@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
+from softtact.evaluation.decisions import UNDECIDED
+
+HOLDS, FAILS = "holds", "fails"
 DRAWS = 4000
 _FEWEST = 10      # draws on one side of a bound from which its share is read
 
@@ -27,10 +29,11 @@ class Comparison:
     low: float
     """Of the two-sided interval of the mean; nan with fewer than two objects."""
     high: float
+    """Upper end of the interval."""
     p_above: float
     """Of the hypothesis that the mean is at most the bound; 1 with fewer than two objects."""
     p_below: float
-    """Of the hypothesis that it is at least the bound."""
+    """Of the hypothesis that it is at least the bound; 1 with fewer than two objects."""
     objects: int
     """How many there are."""
     seeds: int

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.paired import UNDECIDED, Comparison, compare, compare_groups, holm, permutation_p, verdict
+from softtact.evaluation.decisions import UNDECIDED
+from softtact.evaluation.paired import Comparison, compare, compare_groups, holm, permutation_p, verdict
 from softtact.studies.decide.config import CONTROLS, ELASTIC, HYPERELASTIC, MATCHED
 from softtact.studies.decide.policies import HYBRID, remeshed_choices
 from softtact.studies.decide.scoring import PRIMARY

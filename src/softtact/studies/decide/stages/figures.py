@@ -1,9 +1,11 @@
 """The figures: maps of one object, scores of all contestants, the collapse, the learning curves, the map of robustness."""
 
+import itertools
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.patches import Patch
 
 from softtact.evaluation.paired import compare
 from softtact.files import read_dataset
@@ -11,6 +13,8 @@ from softtact.reporting.style import colour, pyplot, save
 
 _FAMILY_COLOURS = {"elastic": colour("elastic"), "electrodes": "#b35806", "foundation": colour("foundation"),
                    "hyperelastic": colour("hyperelastic")}
+_SHADES = {"smooth": 0.45, "stepped": 1.0}     # opacity of the bars
+_CROSSES = "x+1234"     # of elastic layers and of the foundation model, in turns
 _SIGNS = {"undecided": "0.75", "holds": colour("hyperelastic"), "fails": colour("elastic")}
 
 
@@ -48,13 +52,15 @@ def draw_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
         axes, own = grid[row, column], scores[(scores.truth == truth) & (scores.readout == readout)]
         axes.set_title(f"truth {truth}, {readout}", fontsize=8)
         _bars(axes, own, models, settings["seed"])
-        axes.set_xlabel("error over mean reading")
+        axes.set_xlabel("error over mean reading (1)")
+    figure.legend(handles=[Patch(color="0.3", alpha=shade, label=f"{kind} objects") for kind, shade in _SHADES.items()],
+                  loc="outside upper center", ncols=2, fontsize=8)
     save(figure, outputs["png"], outputs["svg"])
 
 
 def _bars(axes, rows, models, seed):
     """A bar for each contestant on smooth and on stepped objects."""
-    for offset, (kind, shade) in enumerate((("smooth", 0.45), ("stepped", 1.0))):
+    for offset, (kind, shade) in enumerate(_SHADES.items()):
         for place, model in enumerate(models):
             table = rows[(rows.model == model) & (rows.kind == kind)].pivot(index="object", columns="seed", values="error_share")
             if not len(table):
@@ -62,7 +68,7 @@ def _bars(axes, rows, models, seed):
             found = compare(table.to_numpy(), draws=1000, seed=seed)
             spread = [[max(found.mean - found.low, 0)], [max(found.high - found.mean, 0)]] if np.isfinite(found.low) else None
             axes.barh(place + 0.4 * offset - 0.2, found.mean, 0.38, xerr=spread, color=colour(model), alpha=shade,
-                      label=kind if place == 0 else None, error_kw={"lw": 0.8})
+                      error_kw={"lw": 0.8})
     axes.set_yticks(range(len(models)), models)
     axes.invert_yaxis()
 
@@ -72,8 +78,9 @@ def draw_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     table = pd.read_csv(inputs["collapse"])
     figure = pyplot().figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
+    crosses = itertools.cycle(_CROSSES)
     for (family, model), own in table.groupby(["family", "model"], sort=False):
-        axes.plot(own.ratio, own.lower_share, "o" if family == "hyperelastic" else "x", ms=3, mew=0.8, alpha=0.7,
+        axes.plot(own.ratio, own.lower_share, "o" if family == "hyperelastic" else next(crosses), ms=4, mew=0.8, ls="", alpha=0.7,
                   color=_FAMILY_COLOURS[family], label=model, mfc="none" if model != "hyperelastic" else None)
     axes.set_xlim(0, min(4.0, float(table.ratio.max())) if len(table) else 1)
     axes.set_xlabel("step height over indentation (1)")

@@ -17,7 +17,6 @@ from softtact.studies.decide.pressing import press_item, sensor_of
 from softtact.studies.decide.scoring import fit_gain, ideal_of
 
 COLLAPSE_COLUMNS = ["family", "model", "young_mpa", "object", "step_mm", "force_n", "indentation_mm", "ratio", "lower_share"]
-_LEAST_OBJECTS = 3     # of a variant, whose verdict is of few objects and says so
 
 
 def trace_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -62,7 +61,8 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     inputs: variants (presses, the objects of one variant after those of the other), presses_elastic, presses_matched,
     presses_hyperelastic (lists, of the objects), sensor;  outputs: robustness (CSV)
     settings: variants [{law, bulk_over_shear, tips_bonded, mesh}, ...], objects, seed, statistics
-    Read by the gap formula, whose one gain is fitted to the other objects. Of few objects: an orientation, no test.
+    Read by the gap formula, whose one gain is fitted to the other objects, and of a single object to itself. With fewer objects
+    than the statistics ask for every verdict is undecided: means and intervals then orient, they test nothing.
     """
     spec, count = SensorSpec.from_yaml(inputs["sensor"]), len(settings["objects"])
     tested = {model: [read_dataset(path) for path in inputs[f"presses_{model}"]] for model in (ELASTIC, MATCHED, HYPERELASTIC)}
@@ -83,13 +83,17 @@ def _nearer(gain: np.ndarray, name: str, settings: Mapping[str, Any]) -> dict[st
     if not len(gain):
         return {f"gain_{name}": np.nan, f"low_{name}": np.nan, f"high_{name}": np.nan, f"verdict_{name}": "undecided"}
     found = compare(gain, seed=settings["seed"])
-    word = verdict(found.p_above, found.p_below, objects=found.objects, least_objects=_LEAST_OBJECTS,
-                   level=settings["statistics"]["level"])
+    statistics = settings["statistics"]
+    word = verdict(found.p_above, found.p_below, objects=found.objects, least_objects=statistics["least_objects"],
+                   level=statistics["level"])
     return {f"gain_{name}": found.mean, f"low_{name}": found.low, f"high_{name}": found.high, f"verdict_{name}": word}
 
 
 def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any]) -> np.ndarray:
-    """Errors over the readings (object,) of the gap formula, its gain fitted to the others; nan without a valid load step."""
+    """Errors over the readings (object,) of the gap formula; nan without a valid load step.
+
+    The gain is fitted to the other objects, or to the object itself where no other has a valid load step.
+    """
     pairs = [_counts(spec, truth, press) for truth, press in zip(truths, presses, strict=True)]
     errors = np.full(len(pairs), np.nan)
     for k, (true, ideal) in enumerate(pairs):
