@@ -26,7 +26,7 @@ def draw_maps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     presses = {model: read_dataset(inputs[f"presses_{model}"][0]) for model in settings["models"]}
     steps = np.flatnonzero(np.logical_and.reduce([press.converged.values == 1 for press in presses.values()]))
     step = int(steps[-1]) if len(steps) else 0
-    figure = pyplot().figure(figsize=(1.9 * len(presses), 3.4), layout="constrained")
+    figure = pyplot().figure(figsize=(1.9 * len(presses), 3.8), layout="constrained")
     for axes, (model, press) in zip(figure.subplots(1, len(presses), sharey=True), presses.items(), strict=True):
         extent = [float(press[axis][end]) for axis in ("x", "y") for end in (0, -1)]
         image = axes.imshow(press.deformation_map_mm.values[step], origin="lower", extent=extent, cmap="viridis", vmin=0)
@@ -50,7 +50,11 @@ def draw_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     grid = figure.subplots(len(truths), len(readouts), squeeze=False, sharey=True)
     for (row, truth), (column, readout) in ((one, other) for one in enumerate(truths) for other in enumerate(readouts)):
         axes, own = grid[row, column], scores[(scores.truth == truth) & (scores.readout == readout)]
+        if not len(own):      # networks are not trained for every truth
+            axes.set_axis_off()
+            continue
         axes.set_title(f"truth {truth}, {readout}", fontsize=8)
+        axes.locator_params(axis="x", nbins=4)
         _bars(axes, own, models, settings["seed"])
         axes.set_xlabel("error over mean reading (1)")
     figure.legend(handles=[Patch(color="0.3", alpha=shade, label=f"{kind} objects") for kind, shade in _SHADES.items()],
