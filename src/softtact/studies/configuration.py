@@ -34,6 +34,11 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
     return values
 
 
+def read_over(default: str | Path, path: str | Path) -> dict[str, Any]:
+    """The keys and values of a configuration file over those of the default one; a key that it states is taken as a whole."""
+    return read_mapping(default) | (read_mapping(path) if Path(path) != Path(default) else {})
+
+
 def validated(model: type[_Checked], values: object, *, where: str) -> _Checked:
     """`model` from plain values; raises an InputError with the field and the remedy for the first fault."""
     try:

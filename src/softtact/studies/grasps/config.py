@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt
 from softtact.sensors.fields import plain_value
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
-from softtact.studies.configuration import here_or_shipped, read_mapping, refuse_unknown, validated
+from softtact.studies.configuration import here_or_shipped, read_mapping, read_over, refuse_unknown, validated
 from softtact.studies.hybrid.keys import CatalogueEntry, Law, Name, NotNegative, VirtualSensorKey
 from softtact.studies.hybrid.objects import read_catalogue
 from softtact.unknown_names import Section
@@ -95,7 +95,7 @@ class GraspStudy:
 
 def read_values(path: str | Path) -> dict[str, Any]:
     """The configuration mapping of a file; what it does not state is as in config/grasps.yaml."""
-    return read_mapping(DEFAULT) | (read_mapping(path) if Path(path) != Path(DEFAULT) else {})
+    return read_over(DEFAULT, path)
 
 
 def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> GraspStudy:
