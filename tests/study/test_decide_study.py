@@ -5,22 +5,28 @@ import itertools
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
+import xarray
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
 from softtact.evaluation.curve_shape import lower_shares
 from softtact.evaluation.decisions import NOT, REPRODUCED, UNDECIDED
+from softtact.files import write_dataset
 from softtact.geometry.generated import draw_objects
 from softtact.studies.decide.claims import claims_of_decision
 from softtact.studies.decide.config import MODELS, load_study, read_values
 from softtact.studies.decide.hypotheses import Tables, hypothesis_table, shown_objects
 from softtact.studies.decide.policies import policy_scores
-from softtact.studies.decide.scoring import COLUMNS, fit_gain
+from softtact.studies.decide.pressing import press_item, sensor_of
+from softtact.studies.decide.scoring import COLUMNS, SCORES, fit_gain
 from softtact.studies.decide.stages.judging import with_flatness
+from softtact.studies.decide.stages.maps import map_robustness
 
 STEPPED = draw_objects(0, 4, steps_mm=(0.1, 0.8), side_mm=22.0, seed=5)
 STATISTICS = read_values("config/decide.yaml")["statistics"]
 SEEDS = range(3)
+SMALL = "config/small/few_frusta.yaml"
 
 
 @pytest.mark.parametrize("made", STEPPED, ids=lambda made: made.name)
@@ -117,6 +123,50 @@ def test_a_truth_without_the_detail_decides_nothing_on_details():
 
 def test_few_objects_are_undecided():
     assert all(words == {"undecided"} for words in verdicts(tables_of(simulated(0.05, objects=4))).values())
+
+
+def test_a_hybrid_that_is_as_good_as_the_hyperelastic_model_is_within_the_margin():
+    """No gain and a scatter of a fifth of the margin: the mean is 0, and above minus the margin with certainty."""
+    assert verdicts(tables_of(simulated(0.0, scatter=0.002)))["balance"] == {"holds"}
+    worse = simulated(0.0, scatter=0.002)
+    worse.loc[worse.model == "elastic", list(SCORES)] += [2 * STATISTICS["margin"] * sign for sign in (2, -2, -2, -2)]
+    assert verdicts(tables_of(worse))["balance"] == {"fails"}
+
+
+def test_the_collapse_counts_what_a_model_shows_more_than_the_elastic_layer_at_equal_ratios():
+    table = hypothesis_table(tables_of(simulated(0.0), shown=0.9), statistics=STATISTICS, truths=["a"], seed=0)
+    assert table[table.claim == "collapse"]["mean"].tolist() == pytest.approx([0.7])      # .9 and .2 in `tables_of`
+
+
+def bump(x_mm, width_mm):
+    """A map (21, 17) in mm of the small sensor: a round bump 0.1 mm deep."""
+    y, x = np.meshgrid(np.linspace(-6, 6, 21), np.linspace(-4.8, 4.8, 17), indexing="ij")
+    return 0.1 * np.exp(-((x - x_mm)**2 + y**2) / width_mm**2)
+
+
+def test_the_model_whose_maps_are_the_truths_is_nearer_in_the_map_of_robustness_but_few_objects_decide_nothing(tmp_path):
+    places = (-2.0, 0.0, 2.0)
+    widths = {"variants": 2.0, "presses_hyperelastic": 2.0, "presses_elastic": 3.5, "presses_matched": 3.0}
+    paths = {name: [tmp_path / f"{name}_{place}.nc" for place in places] for name in widths}
+    for name, width in widths.items():
+        for place, path in zip(places, paths[name], strict=True):
+            data = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), bump(place, width)[None]),
+                                   "normal_force_n": ("step", [2.5]), "within_validity": ("step", [1])})
+            write_dataset(path, data, seed=None, settings={})
+    map_robustness(inputs=paths | {"sensor": SMALL}, outputs={"robustness": tmp_path / "robustness.csv"},
+                   settings={"variants": [{"law": "made_up"}], "objects": list(places), "seed": 0, "statistics": STATISTICS})
+    row = pd.read_csv(tmp_path / "robustness.csv").iloc[0]
+    assert row.error_hyperelastic == pytest.approx(0, abs=1e-9) and row.gain_over_elastic > row.gain_over_matched > 0.05
+    assert row.verdict_over_elastic == row.verdict_over_matched == UNDECIDED
+
+
+def test_an_elastic_layer_twice_as_stiff_needs_twice_the_force_for_the_same_map(tmp_path):
+    trimesh.creation.icosphere(subdivisions=3, radius=4.0).export(tmp_path / "ball.stl")
+    model = {"kind": "elastic", "plane": "surface", "young_mpa": "printed"}
+    printed = sensor_of(SMALL, model).spec.elastic_layer.young_mpa
+    one, twice = (press_item(sensor_of(SMALL, model, young_mpa=factor * printed), model, tmp_path / "ball.stl", unit="mm",
+                             forces_n=[factor]) for factor in (1.0, 2.0))
+    np.testing.assert_allclose(twice.deformation_map_mm, one.deformation_map_mm, atol=1e-6)
 
 
 def test_half_of_the_objects_at_a_hundredth_of_the_time_costs_half_and_is_not_told_from_it():
