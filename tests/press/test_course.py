@@ -112,8 +112,9 @@ def test_a_model_that_does_not_hold_is_not_taken_whatever_error_it_tells(fakes):
 
 def test_the_first_force_that_a_model_does_not_hold_for_is_said(fakes):
     valid = np.array([1, 0], dtype=np.int8)
-    fakes["elastic"] = replace(fakes["elastic"], normal_force_n=np.array([0.3, 0.5]), within_validity=valid)
-    assert "the elastic model does not hold from 0.5 N on" in chosen().selection_reason
+    fakes["elastic"] = replace(fakes["elastic"], normal_force_n=np.array([0.3, 0.5]), within_validity=valid,
+                               validity_reason=np.array(["", "too deep"]))
+    assert "the elastic model does not hold from 0.5 N on (too deep)" in chosen().selection_reason
 
 
 def test_a_fast_model_by_itself_states_the_interval_of_its_own(sensor):

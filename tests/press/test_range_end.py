@@ -1,11 +1,12 @@
-"""What stands beside the counts: taxels at the end of the converter's range, and the sensor that an expected error is known of."""
+"""What stands beside the counts: taxels at the end of the converter's range, why load steps are flagged, and the sensor that an
+expected error is known of."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 
-from softtact.commands.press import _error_line, _range_line
+from softtact.commands.press import _error_line, _range_line, _validity_lines
 from softtact.press.result import PressResult
 from softtact.studies.hybrid.page import range_end_sentence
 
@@ -39,3 +40,9 @@ def test_the_study_s_page_says_how_many_readings_are_at_the_end_at_its_own_gain(
     assert "0.7% of the taxels' readings" in range_end_sentence(gains, config)
     low = {"virtual_sensor": {"counts_per_relative_change": 1300}}
     assert range_end_sentence(gains, low) == range_end_sentence(gains, {}) == ""
+
+
+def test_the_summary_names_each_reason_with_the_forces_at_which_it_flags():
+    summary = {"normal_force_n": [5.0, 20.0, 50.0], "within_validity": [1, 0, 0], "validity_reason": ["", "narrow", "deep; narrow"]}
+    said = "beyond what the model is valid for: "
+    assert list(_validity_lines(summary)) == [f"{said}20, 50 N: narrow", f"{said}50 N: deep"]

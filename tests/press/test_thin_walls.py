@@ -12,8 +12,8 @@ from softtact.errors import NarrowPartWarning
 from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.models.elastic.tangential import surface_compliance
-from softtact.press.making import resolved_elastic
 from softtact.press.sensor import Sensor
+from softtact.press.validity import resolved_elastic
 from softtact.readout.capacitance import felt_displacement, ideal_counts
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # points of the surface 0.3 mm apart
@@ -114,5 +114,5 @@ def test_a_motion_of_walls_between_the_points_is_flagged_with_its_reason():
     sensor = Sensor(SMALL, {}, prepared_models={"elastic_surface": surface_compliance(SMALL)})
     with pytest.warns(NarrowPartWarning, match="fall between the points"):
         result = sensor.press(walls(0.1), motion="z -0.05", model="elastic", label="")
-    assert not result.within_validity.any()
+    assert not result.within_validity.any() and "fall between the points" in result.validity_reason[0]
     assert sensor.press(walls(0.6), motion="z -0.05", model="elastic", label="").within_validity.all()

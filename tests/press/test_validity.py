@@ -8,8 +8,8 @@ from support.laws import LAWS
 
 from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.newton import NewtonSettings
-from softtact.press.making import valid_elastic, valid_foundation, valid_hyperelastic
 from softtact.press.sensor import Sensor
+from softtact.press.validity import flags_elastic, flags_foundation, flags_hyperelastic, reasons
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
         "rough": [False, False, False], "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}
@@ -18,7 +18,12 @@ GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.00
 def valid(**changed):
     """Load steps of a press in which frusta of 0.5 mm may be compressed by 0.4 mm, and overlaps of 0.001 mm were asked for."""
     load_steps = {name: np.array(values) for name, values in (GOOD | changed).items()}
-    return valid_hyperelastic(**load_steps, frustum_mm=0.5, allowed_mm=0.001).tolist()
+    return holds(flags_hyperelastic(**load_steps, frustum_mm=0.5, allowed_mm=0.001))
+
+
+def holds(flags):
+    """Which of three load steps have no flag."""
+    return (reasons(flags, 3) == "").tolist()
 
 
 def test_all_load_steps_of_a_good_press_hold():
@@ -42,16 +47,26 @@ def test_load_steps_that_do_not_grow_with_the_force_are_flagged(depth, expected)
 
 
 def test_elastic_load_steps_hold_to_half_of_the_layer():
-    assert valid_elastic(np.array([0.1, 1.24, 1.26]), thickness_mm=2.5).tolist() == [True, True, False]
+    flags = flags_elastic(np.array([0.1, 1.24, 1.26]), np.ones((3, 9, 9)), thickness_mm=2.5, dielectric_mm=1.0)
+    assert holds(flags) == [True, True, False]
 
 
 def test_foundation_load_steps_hold_within_their_law_and_what_was_compared():
     compression = np.array([0.05, 0.164, 0.166])
     sensor, hardly = {"frustum_mm": 0.5, "thickness_mm": 2.0}, np.zeros(3)
-    assert valid_foundation(compression, hardly, **sensor, law_limit_mm=1.0).tolist() == [True, True, False]    # 0.33 of 0.5 mm
-    assert valid_foundation(compression, hardly, **sensor, law_limit_mm=0.07).tolist() == [True, False, False]
+    assert holds(flags_foundation(compression, hardly, **sensor, law_limit_mm=1.0)) == [True, True, False]    # 0.33 of 0.5 mm
+    assert holds(flags_foundation(compression, hardly, **sensor, law_limit_mm=0.07)) == [True, False, False]
     deep = np.array([0.99, 1.01, 0.5])      # half of the layer
-    assert valid_foundation(hardly, deep, **sensor, law_limit_mm=1.0).tolist() == [True, False, True]
+    assert holds(flags_foundation(hardly, deep, **sensor, law_limit_mm=1.0)) == [True, False, True]
+
+
+def test_a_flagged_load_step_names_its_limits_and_all_of_its_reasons():
+    narrow = np.zeros((3, 9, 9))
+    narrow[:, 4] = 0.6
+    flags = flags_elastic(np.array([0.6, 1.3, 1.3]), narrow * [[[1]], [[1]], [[0.5]]], thickness_mm=2.5, dielectric_mm=1.0)
+    deep = "the object is deeper in than 1.25 mm, half of the linear layer"
+    thin = "a wall or pin narrower than three points of the surface is deeper in than 0.5 mm, half of the dielectric"
+    assert reasons(flags, 3).tolist() == [thin, f"{deep}; {thin}", deep]
 
 
 @pytest.mark.parametrize("height, expected", [(0.1, 0), (3.0, 1)])
@@ -60,6 +75,7 @@ def test_an_object_whose_top_has_sunk_in_is_flagged(height, expected):
     disc = trimesh.creation.cylinder(radius=1.8, height=height, sections=64)
     result = Sensor(SMALL, LAWS, mesh=COARSE).press(disc, force_n=[3.0], model="hyperelastic")
     assert result.indentation_mm[0] > 0.1 and result.within_validity[0] == expected
+    assert result.validity_reason[0] == ("" if expected else "the object is 0.1 mm high, and its top is below the surface")
 
 
 @pytest.mark.slow

@@ -175,6 +175,7 @@ def _summary(data):
                "force_n": data.force_n[row].values.tolist(), "contact": data.contact[row].values.tolist(),
                "model": data.model[k].values.tolist(), "selection_reason": data.selection_reason[k].values.tolist(),
                "within_validity": data.within_validity[k].values.tolist(),
+               "validity_reason": data.validity_reason[k].values.tolist(),
                "largest_deformation_mm": data.deformation_map_mm[k].max(dim=("y", "x")).values.tolist(),
                "tactile_map": data.tactile_map[k].values.tolist()} for k, row in enumerate(rows)]
     held = bool(data.contact[rows[-1]].all())
@@ -189,7 +190,8 @@ def _lines(summary):
             x, y, z = event["force_n"][finger]
             head = f"{event['event']:9}{event['time_s']:9.2f}{event['opening_mm']:13.3f}" if finger == 0 else " " * 31
             counts = sum(map(sum, event["tactile_map"][finger]))
-            flag = "" if event["within_validity"][finger] else "  (beyond what the model is valid for)"
+            flag = ("" if event["within_validity"][finger] else
+                    f"  (beyond what the model is valid for: {event['validity_reason'][finger]})")
             yield (f"{head}  {name:7}{-z + 0.0:10.3f}{(x * x + y * y) ** 0.5:10.3f}{event['largest_deformation_mm'][finger]:13.4f}"
                    f"{counts:13.0f}  {event['model'][finger]}{flag}")
     if summary["events"][-1]["event"] == "lift":

@@ -270,8 +270,7 @@ def _summary_on_layers(result):
     if "taxels" in result.readings:
         load_steps |= {"tactile_map": result.tactile_map, "taxels_at_range_end": result.taxels_at_range_end}
     names = ("penetration_mm", "frustum_compression_mm", "residual_n", "extrapolated_volume_fraction", "expected_error_mm",
-             "within_validity",
-             "iterations", "wall_time_s")
+             "within_validity", "validity_reason", "iterations", "wall_time_s")
     load_steps |= {name: getattr(result, name) for name in names}
     load_steps |= {name: getattr(result, name) for name in ("torque_nmm", "hyperelastic_counts", "expected_error_counts")}
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
@@ -344,6 +343,14 @@ def _count_lines(summary):
         yield f"counts to expect of the hyperelastic model at {force:.4g} N: {middle:.0f} ({low:.0f} to {high:.0f}){share}"
 
 
+def _validity_lines(summary):
+    """The forces of the flagged load steps, a line for each reason."""
+    from softtact.press.validity import by_reason
+
+    for reason, forces in by_reason(*(summary[name] for name in ("normal_force_n", "within_validity", "validity_reason"))).items():
+        yield f"beyond what the model is valid for: {', '.join(f'{force:.4g}' for force in forces)} N: {reason}"
+
+
 def _quality_lines(summary):
     """The quality of the solution, as the worst of the load steps."""
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
@@ -356,10 +363,7 @@ def _quality_lines(summary):
     if None not in summary["expected_error_counts"]:
         yield from _count_lines(summary)
     yield from _range_line(summary)
-    if not all(summary["within_validity"]):
-        flagged = zip(summary["normal_force_n"], summary["within_validity"], strict=True)
-        forces = ", ".join(f"{force:.4g}" for force, valid in flagged if not valid)
-        yield f"beyond what the model is valid for: {forces} N"
+    yield from _validity_lines(summary)
     if None not in summary["extrapolated_volume_fraction"]:
         yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a layer"
     yield from (f"written: {path}" for path in summary["written"])

@@ -189,8 +189,9 @@ def _by_error(sensor, placed, forces, tolerance_mm, control):
     for name, result in pressed.items():
         if not result.within_validity.all():
             errors[name] = np.full(len(forces), np.inf)
-            first = result.normal_force_n[result.within_validity == 0][0]
-            remarks.append(f"the {name} model does not hold from {first:g} N on")
+            first = np.flatnonzero(result.within_validity == 0)[0]
+            why = f" ({result.validity_reason[first]})" if result.validity_reason[first] else ""
+            remarks.append(f"the {name} model does not hold from {result.normal_force_n[first]:g} N on{why}")
     mostly = {name: INTERVALS[name][1] * values for name, values in errors.items()}
     model = cheapest(mostly, tolerance_mm)
     in_um = [f"{name} {1e3 * values.max():.3g} (90 % below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()

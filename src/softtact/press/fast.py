@@ -19,9 +19,10 @@ from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.cache import cached_surface_compliance
-from softtact.press.making import make_result, resolved_elastic, shell_of, valid_elastic, valid_foundation, warn_of_shell
+from softtact.press.making import make_result, shell_of, warn_of_shell
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
+from softtact.press.validity import flagged, flags_elastic, flags_foundation
 from softtact.progress import Watch
 from softtact.readout.capacitance import felt_displacement
 
@@ -97,14 +98,14 @@ def shell_stop_mm(sensor: "Sensor", surface: HeightField) -> float:
 
 def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *, touch_mm: float) -> PressResult:
     """The result of a `LayerPress`; touch_mm: descent of the object to first touch."""
-    contact, unknown, thickness = press.contact, np.full(len(forces), np.nan), sensor.spec.thickness_mm
+    contact, unknown = press.contact, np.full(len(forces), np.nan)
     depth = contact.depth - touch_mm
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=depth,
                        pad_force_n=_snapped(forces, contact.force.sum(axis=0)),
                        contact_area_mm2=press.areas @ (contact.force > 0),
                        penetration_mm=contact.penetration,
-                       within_validity=(valid_elastic(depth, thickness_mm=thickness)
-                                        & resolved_elastic(press.fields, dielectric_mm=sensor.spec.dielectric_thickness_mm)),
+                       flags=flags_elastic(depth, press.fields, thickness_mm=sensor.spec.thickness_mm,
+                                           dielectric_mm=sensor.spec.dielectric_thickness_mm),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
                        felt_mm=felt_displacement(sensor.spec, press.thinning), iterations=contact.iterations)
 
@@ -180,7 +181,7 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
     area, count = points.covered * compliance.grid.areas(points.nodes), len(load_steps)
     compression = np.array([load_step.compression.max() for load_step in load_steps])
     depth = np.array([load_step.depth for load_step in load_steps]) - touch_mm
-    valid = valid_foundation(compression, depth, frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+    flags = flags_foundation(compression, depth, frustum_mm=sensor.spec.dielectric.frusta.height_mm,
                              thickness_mm=sensor.spec.thickness_mm, law_limit_mm=compliance.law.limit_mm)
     unknown = np.full(count, np.nan)
     numbers = {"indentation_mm": depth, "pad_force_n": [load_step.force_n for load_step in load_steps],
@@ -188,7 +189,7 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
                "contact_area_mm2": [area[load_step.touching].sum() for load_step in load_steps],
                "iterations": [load_step.iterations for load_step in load_steps], "frustum_compression_mm": compression}
     return make_result(sensor, "foundation", "dense", FoundationMaps(compliance, points)(load_steps), forces[:count],
-                       np.array(times), within_validity=valid, residual_n=unknown, extrapolated_volume_fraction=unknown,
+                       np.array(times), flags=flags, residual_n=unknown, extrapolated_volume_fraction=unknown,
                        **numbers)
 
 
@@ -229,7 +230,8 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cont
         return found
     warnings.warn("The object has walls or pins that fall between the points of the elastic model's surface in some places of the "
                   "motion: no step is within its validity; use the hyperelastic model.", NarrowPartWarning, stacklevel=4)
-    return replace(found, within_validity=np.zeros_like(found.within_validity))
+    return flagged(found, "walls or pins of the object fall between the points of the surface in some places of the motion",
+                   np.ones(found.steps, dtype=bool))
 
 
 def _between_nodes(sensor, surface):
@@ -270,8 +272,8 @@ def _of_motion(sensor, moved, seconds):
     result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
                          np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
                          felt_mm=felt_displacement(sensor.spec, moved.sunk_mm),
-                         within_validity=(valid_elastic(moved.depth_mm, thickness_mm=sensor.spec.thickness_mm)
-                                          & resolved_elastic(moved.sunk_mm, dielectric_mm=sensor.spec.dielectric_thickness_mm)),
+                         flags=flags_elastic(moved.depth_mm, moved.sunk_mm, thickness_mm=sensor.spec.thickness_mm,
+                                             dielectric_mm=sensor.spec.dielectric_thickness_mm),
                          frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
                          **{name: getattr(moved, name) for name in _OF_MOTION})
     return replace(result, attributes=result.attributes | attributes)

@@ -13,9 +13,10 @@ from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
-from softtact.press.making import make_result, shell_of, valid_hyperelastic
+from softtact.press.making import make_result, shell_of
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
+from softtact.press.validity import flags_hyperelastic
 from softtact.progress import Watch, announce
 from softtact.readout.registry import Samples
 
@@ -112,12 +113,12 @@ class _Record:
         numbers["slip"] = numbers["slip"].reshape(len(steps), *sensor.spec.map_shape)
         _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
         points = np.where(numbers["pad_force_n"] > 0, numbers.pop("points"), np.inf)
-        valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
+        flags = flags_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                    contact_error_mm=numbers.pop("contact_error_mm"), points=points, rough=numbers.pop("rough"),
                                    frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                    allowed_mm=sensor.solver.largest_penetration_mm)
         made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(times),
-                           within_validity=valid, pressure=pressure, **numbers)
+                           flags=flags, pressure=pressure, **numbers)
         return replace(made, bodies=tuple(self._bodies[:len(steps)]))
 
 

@@ -22,11 +22,12 @@ from softtact.models.hyperelastic.build import build_plain_body, build_sensor_bo
 from softtact.press import choice
 from softtact.press.fast import press_elastic_motion
 from softtact.press.hyperelastic import press_hyperelastic
-from softtact.press.making import flag_buried, flag_overloaded, layered_surface
+from softtact.press.making import layered_surface
 from softtact.press.objects import placed_object
 from softtact.press.result import PressResult
 from softtact.press.solid import load_solid, press_body, press_pad, surface_of
 from softtact.press.task import PressTask, checked_forces
+from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.readout import points, strip, taxels  # registered as they are imported  # noqa: F401
 from softtact.readout.registry import SurfaceMotion
 from softtact.sensors.library import material_file

@@ -21,10 +21,10 @@ from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
 from softtact.press.choice import models_to_prepare, with_expected_error
 from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
-from softtact.press.making import flag_buried
 from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
 from softtact.press.task import cores
+from softtact.press.validity import flag_buried
 from softtact.progress import progress
 
 if TYPE_CHECKING:

@@ -75,7 +75,7 @@ class PressResult:
     converged: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) 1 where the solver reached its tolerance."""
     within_validity: np.ndarray = field(metadata=_array("1", "step"))
-    """(step,) 0 where the numbers are not to be relied on; why: docs/reference/command_line.md, "What is flagged"."""
+    """(step,) 0 where the numbers are not to be relied on, for the `validity_reason`."""
     wall_time_s: np.ndarray = field(metadata=_array("s", "step"))
     """(step,) in s: wall time of the load step; the solver's preparation counts to the first."""
     x_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "x", coordinate="x") | _PLANE)
@@ -109,6 +109,9 @@ class PressResult:
     hyperelastic_counts: np.ndarray = field(default=_ABSENT, metadata=_array("counts", "step", "bound") | _LATER)
     """(step, 3) in counts of all taxels: what the hyperelastic model is expected to read in place of a fast model, least, middle
     and most, for nine in ten presses; else nan. See `expected_error_counts`."""
+    validity_reason: np.ndarray = field(default=_ABSENT, metadata=_array("text", "step") | _LATER)
+    """(step,) texts: why `within_validity` is 0, several reasons joined by "; "; empty where it is 1, and in files of earlier
+    versions. The rules: docs/reference/command_line.md, "What is flagged"."""
     selection_reason: str = field(default="", metadata=_FACT)
     """The reason for the choice of the model, if the user did not name it."""
     largest_counts: float = field(default=2400.0, metadata=_FACT)
@@ -128,7 +131,8 @@ class PressResult:
         defaults: dict[str, Callable[[], np.ndarray]] = {
             "pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
             "force_n": lambda: -self.normal_force_n[:, None] * down, "torque_nmm": lambda: np.full((steps, 3), np.nan),
-            "expected_error_mm": lambda: np.full(steps, np.nan), "hyperelastic_counts": lambda: np.full((steps, 3), np.nan)}
+            "expected_error_mm": lambda: np.full(steps, np.nan), "hyperelastic_counts": lambda: np.full((steps, 3), np.nan),
+            "validity_reason": lambda: np.full(steps, "", dtype=str)}
         if self.deformation_map_mm is not None:
             unknown = np.where(down == 0, np.nan, 1.0)
             defaults |= {"displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
@@ -332,6 +336,7 @@ def read_press(path: str | Path) -> PressResult:
             raise InputError(f"{path}: {_name(one)!r} has the dimensions {data[_name(one)].dims} in place of "
                              f"{one.metadata['dimensions']}; write the press again.")
     values: dict[str, Any] = {one.name: data[_name(one)].values for one in needed}
+    values |= {name: value.astype(str) for name, value in values.items() if value.dtype == object}     # texts
     attributes = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
     values |= {name: attributes.pop(name) for name in _facts()}
     geometry, thickness = attributes.pop("geometry", "solid"), attributes.pop("mesh_thickness_mm", 1.0)

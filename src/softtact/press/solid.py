@@ -27,12 +27,13 @@ from softtact.models.solid.body import SolidBody
 from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.result import gathered
-from softtact.press.making import flag_buried, flag_overloaded, layered_surface
+from softtact.press.making import layered_surface
 from softtact.press.objects import OBJECT, PlacedObject, SoftObject, distance_to_touch, first_direction
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult
 from softtact.press.solid_pad import SolidPad
 from softtact.press.task import PressTask, RunControl
+from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.progress import Watch, announce
 from softtact.readout.registry import Samples, SurfaceMotion, readings_of
 from softtact.sensors.solid import SolidSpec

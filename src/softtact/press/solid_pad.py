@@ -25,6 +25,7 @@ from softtact.press.cache import cached_frustum_law
 from softtact.press.making import make_result, shell_of
 from softtact.press.objects import OBJECT, SoftObject
 from softtact.press.result import PressResult
+from softtact.press.validity import flags_solid
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -206,8 +207,7 @@ class SolidPad:
                        for step in steps]  # fmt: skip
         seconds = np.array([step.wall_time_s for step in steps])
         share = np.array([step.extrapolated_volume_fraction for step in steps])
-        deepest = frusta[0].limit_mm if frusta else np.inf
-        valid = ~(np.array(compression) > deepest)
+        flags = flags_solid(np.array(compression), law_limit_mm=frusta[0].limit_mm if frusta else np.inf)
         numbers: dict[str, Any] = {
             "displacement_mm": sampled,
             "force_n": forces[:, :3],
@@ -222,7 +222,7 @@ class SolidPad:
             "iterations": np.array([step.iterations for step in steps]),
         }
         made = make_result(
-            self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, within_validity=valid, **numbers
+            self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, flags=flags, **numbers
         )
         return replace(made, bodies=tuple(self._pressed_body(body, step) for step in steps)) if keep_body else made
 

@@ -133,7 +133,8 @@ _OF_MAPS = {"deformation_map_mm": (("event", "finger", "y", "x"), "mm"),
             "tactile_map": (("event", "finger", "row", "column"), "counts"),
             "pressed_force_n": (("event", "finger"), "N"), "pressed_shear_n": (("event", "finger", "aside"), "N"),
             "model": (("event", "finger"), ""),
-            "selection_reason": (("event", "finger"), ""), "within_validity": (("event", "finger"), "1")}
+            "selection_reason": (("event", "finger"), ""), "within_validity": (("event", "finger"), "1"),
+            "validity_reason": (("event", "finger"), "")}
 
 
 @dataclass(frozen=True)
@@ -154,6 +155,8 @@ class EventMaps:
     """(event, finger): reason for this model."""
     within_validity: np.ndarray
     """(event, finger): 0 where the press is outside the model's validity."""
+    validity_reason: np.ndarray
+    """(event, finger): why it is; empty where it is not."""
 
 
 def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *, model: str = "auto", workers: int | None = None,
@@ -171,7 +174,8 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
     poses = record.object_pose_sensor[record.event_row]
     maps = EventMaps(np.zeros((events, 2, *spec.map_shape)), np.zeros((events, 2, spec.taxels.rows, spec.taxels.columns)),
                      np.zeros((events, 2)), np.zeros((events, 2, 2)), np.full((events, 2), NO_PRESS, dtype=object),
-                     np.full((events, 2), "", dtype=object), np.ones((events, 2), dtype=np.int8))
+                     np.full((events, 2), "", dtype=object), np.ones((events, 2), dtype=np.int8),
+                     np.full((events, 2), "", dtype=object))
     shears = np.zeros((events, 2, 2)) if friction is None else record.force_n[record.event_row, :, :2]
     sheared = (np.linalg.norm(shears, axis=2) > _LEAST_SHEAR_N) & (forces > 0)
     if friction is not None and model not in SHEAR_MODELS:
@@ -197,7 +201,7 @@ def _keep(maps: EventMaps, place: tuple[int, ...], result: "PressResult", *, ste
     maps.deformation_map_mm[place], maps.tactile_map[place] = result.deformation_map_mm[step], result.tactile_map[step]
     maps.pressed_force_n[place] = result.pad_force_n[step] + result.shell_force_n[step]
     maps.model[place], maps.selection_reason[place] = result.model, result.selection_reason or "named by the user"
-    maps.within_validity[place] = result.within_validity[step]
+    maps.within_validity[place], maps.validity_reason[place] = result.within_validity[step], str(result.validity_reason[step])
 
 
 def pose_of(values: np.ndarray) -> Pose:

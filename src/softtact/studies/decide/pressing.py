@@ -79,6 +79,8 @@ def _with_all_steps(data, forces):
     missing = len(forces) - data.sizes["step"]
     if not missing:
         return data
-    whole = data.pad(step=(0, missing))
+    whole = data.drop_vars("validity_reason").pad(step=(0, missing))
+    reasons = [*data["validity_reason"].values, *["the load step was not reached"] * missing]
     flags = {name: ("step", np.pad(data[name].values, (0, missing)), data[name].attrs) for name in ("converged", "within_validity")}
-    return whole.assign(normal_force_n=("step", forces, data.normal_force_n.attrs), **flags)
+    return whole.assign(normal_force_n=("step", forces, data.normal_force_n.attrs),
+                        validity_reason=("step", np.array(reasons, dtype=str), data.validity_reason.attrs), **flags)
