@@ -74,7 +74,7 @@ def test_forces_on_pad_and_shell_are_written_and_read_back(tmp_path):
 
 
 @pytest.mark.parametrize(("edge", "message"), [
-    ({"held": "side"}, "field 'edge.held' is not usable: .*write sides, free, or {sides_below_mm: h}"),
+    ({"held": "side"}, "field 'edge.held' is not usable: .*write sides, free, far, or {sides_below_mm: h}"),
     ({"held": {"sides_below_mm": -1}}, "its sides_below_mm is -1; give a height in mm above 0"),
     ({"sides_below_mm": 5.0}, "5 mm is not less than the height of the layers, 2 mm"),
     ({"hold": "free"}, "at 'edge': there is no key 'hold'")])

@@ -84,7 +84,8 @@ def _cost(plan, left, costs, cores):
     spec, times = plan.sensor.spec, costs["grasps"]["seconds"]
     bound = "at most " if plan.model == "auto" else ""
     minutes = left * plan.fingers * times["hyperelastic" if plan.model == "auto" else plan.model] / 60 / cores
-    each = 4 * spec.map_shape[0] * spec.map_shape[1] + 2 * spec.taxels.rows * spec.taxels.columns
+    taxels = spec.need_taxels("a data set of presses")
+    each = 4 * spec.map_shape[0] * spec.map_shape[1] + 2 * taxels.rows * taxels.columns
     size_mb = plan.presses * plan.fingers * len(plan.forces_n) * each / 1e6
     return (f"{left} of {plan.presses} presses left, {bound}{minutes:.0f} minutes on {cores} cores and {size_mb:.0f} MB in all; "
             f"times: {costs['grasps']['origin']}")

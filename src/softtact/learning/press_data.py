@@ -151,8 +151,9 @@ def _refuse_other(part, file, plan):
 def _begin(file, plan):
     """Empty arrays of their final size."""
     spec, n, f, s = plan.sensor.spec, plan.presses, plan.fingers, len(plan.forces_n)
+    taxels = spec.need_taxels("a data set of presses")
     shapes = {"deformation_map_mm": ((n, s, f, *spec.map_shape), "f4", "mm"),
-              "tactile_map": ((n, s, f, spec.taxels.rows, spec.taxels.columns), "u2", "counts"),
+              "tactile_map": ((n, s, f, taxels.rows, taxels.columns), "u2", "counts"),
               "indentation_mm": ((n, s, f), "f4", "mm"), "within_validity": ((n, s, f), "i1", "1"), "status": ((n,), "i1", "1")}
     for name, (shape, kind, units) in shapes.items():
         file.create_dataset(name, shape, kind, chunks=(min(n, _BLOCK), *shape[1:])).attrs["units"] = units

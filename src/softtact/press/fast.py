@@ -25,6 +25,7 @@ from softtact.press.task import RunControl
 from softtact.press.validity import flagged, flags_elastic, flags_foundation
 from softtact.progress import Watch
 from softtact.readout.capacitance import felt_displacement
+from softtact.readout.registry import PlaneMotion
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -267,13 +268,14 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
 
 def _of_motion(sensor, moved, seconds):
     """The result of an `ElasticMotion`."""
-    unknown = np.full(len(moved.depth_mm), np.nan)
+    unknown, spec = np.full(len(moved.depth_mm), np.nan), sensor.spec
+    plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, moved.displacement_mm, moved.traction_mpa, moved.slides, moved.gap_mm)
     attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}
     result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
                          np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
                          felt_mm=felt_displacement(sensor.spec, moved.sunk_mm),
                          flags=flags_elastic(moved.depth_mm, moved.sunk_mm, thickness_mm=sensor.spec.thickness_mm,
                                              dielectric_mm=sensor.spec.dielectric_thickness_mm),
-                         frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
+                         frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown, plane=plane,
                          **{name: getattr(moved, name) for name in _OF_MOTION})
     return replace(result, attributes=result.attributes | attributes)

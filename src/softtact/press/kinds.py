@@ -29,7 +29,7 @@ from softtact.press.solid import load_solid, press_body, press_pad, surface_of
 from softtact.press.task import PressTask, checked_forces
 from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.readout import points, strip, taxels  # registered as they are imported  # noqa: F401
-from softtact.readout.registry import SurfaceMotion
+from softtact.readout.registry import PlaneMotion, SurfaceMotion
 from softtact.sensors.library import material_file
 from softtact.sensors.specification import AnySpec
 
@@ -144,7 +144,8 @@ def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callabl
 
 def layers_at_rest(sensor: "Sensor") -> SurfaceMotion:
     """The surface of layers at rest."""
-    return layered_surface(sensor.spec, np.zeros((1, *sensor.spec.map_shape)))
+    surface = layered_surface(sensor.spec, np.zeros((1, *sensor.spec.map_shape)), np.zeros((1, *sensor.spec.map_shape, 3)))
+    return replace(surface, plane=PlaneMotion.at_rest(sensor.spec.map_x_mm, sensor.spec.map_y_mm))
 
 
 _LAYERS = Kind(load=load_layers, at_rest=layers_at_rest, models={

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,9 +34,12 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     lower_maps among these: maps of a lower side that moves; readings follow from the change of thickness
     felt_mm among these: the change of thickness that readings follow from, where it is known between the maps' points
     pressure among these: `Samples` of the contact pressure at each load step, where the model gives it
+    plane among these: the `PlaneMotion` of the map's points, where the model gives it
     """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
-    lower_maps, pressure = numbers.pop("lower_maps", None), numbers.pop("pressure", None)
+    lower_maps, pressure, plane = (numbers.pop(name, None) for name in ("lower_maps", "pressure", "plane"))
+    if plane is not None:
+        numbers["traction_mpa"] = plane.traction_mpa
     thinning = numbers.pop("felt_mm", maps if lower_maps is None else maps - lower_maps.reshape(maps.shape))
     why = reasons(numbers.pop("flags"), len(forces))
     flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8), "within_validity": (why == "").astype(np.int8),
@@ -43,6 +47,7 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
     warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
     surface = layered_surface(spec, thinning, arrays.get("displacement_mm", -maps[..., None] * [np.nan, np.nan, 1.0]), pressure)
+    surface = surface if plane is None else replace(surface, plane=plane)
     return PressResult(deformation_map_mm=maps, readings=readings_of(sensor.readouts, surface), normal_force_n=forces,
                        wall_time_s=times, x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,

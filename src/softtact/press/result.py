@@ -100,6 +100,9 @@ class PressResult:
     displacement_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x", "axis") | _PLANE)
     """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model gives the map alone.
     Of a sensor without a plane `solid.displacement_mm` (step, node, 3)."""
+    traction_mpa: np.ndarray = field(default=_ABSENT, metadata=_array("MPa", "step", "y", "x", "axis") | _PLANE | _LATER)
+    """(step, y, x, 3) in MPa: the object's force on the sensing surface per area at rest, along x, y, z; z is negative where it
+    presses. Of the elastic model's presses with a motion, and of gels with a camera; else nan."""
     slip: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
     """(step, y, x) in mm: how far the surface slid along the object since first contact; nan where it does not touch, and where
     the model has no friction."""
@@ -136,6 +139,7 @@ class PressResult:
         if self.deformation_map_mm is not None:
             unknown = np.where(down == 0, np.nan, 1.0)
             defaults |= {"displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
+                         "traction_mpa": lambda: np.full((*self.deformation_map_mm.shape, 3), np.nan),
                          "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan)}
         elif self.solid is not None:
             defaults["displacement_mm"] = lambda: self.solid.displacement_mm

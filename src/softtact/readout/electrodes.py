@@ -23,8 +23,9 @@ def taxel_means(spec: "BaseSpec", field: np.ndarray, *, spacing_mm: float = 0.0,
 def electrode_weights(spec: "BaseSpec", *, spacing_mm: float = 0.0,
                       shift_mm: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
     """Weights (rows, y) and (columns, x) whose products give the means over electrodes; arguments as for `taxel_means`."""
-    return (_averaging(tuple(spec.map_y_mm), spec.taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
-            _averaging(tuple(spec.map_x_mm), spec.taxels.columns, spacing=spacing_mm, shift=shift_mm[0]))
+    taxels = spec.need_taxels("a mean over electrodes")
+    return (_averaging(tuple(spec.map_y_mm), taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
+            _averaging(tuple(spec.map_x_mm), taxels.columns, spacing=spacing_mm, shift=shift_mm[0]))
 
 
 @lru_cache(maxsize=32)     # the same for all presses of a sensor, and a tenth of a press with the elastic model
@@ -50,7 +51,8 @@ def _averaging(grid, count, *, spacing=0.0, shift=0.0):
 
 def electrode_sides(spec: "BaseSpec", *, spacing_mm: float = 0.0) -> tuple[float, float]:
     """Sides (x, y) of an electrode in mm."""
-    return (spec.footprint_mm[0] / spec.taxels.columns - spacing_mm, spec.footprint_mm[1] / spec.taxels.rows - spacing_mm)
+    taxels = spec.need_taxels("an electrode's size")
+    return (spec.footprint_mm[0] / taxels.columns - spacing_mm, spec.footprint_mm[1] / taxels.rows - spacing_mm)
 
 
 def edge_excess(side_mm: float, gap_mm: np.ndarray) -> np.ndarray:
@@ -69,8 +71,9 @@ def fringe_factor(spec: "BaseSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0
     outer, inner: share of `edge_excess` for an edge on the sensor's border, and for one with a neighbour (1: as without neighbour)
     """
     sides = electrode_sides(spec, spacing_mm=spacing_mm)
-    along_x = _edge_share(spec.taxels.columns, outer, inner)[None, :]
-    along_y = _edge_share(spec.taxels.rows, outer, inner)[:, None]
+    taxels = spec.need_taxels("the field at electrodes' edges")
+    along_x = _edge_share(taxels.columns, outer, inner)[None, :]
+    along_y = _edge_share(taxels.rows, outer, inner)[:, None]
     return 1 + along_x * edge_excess(sides[0], gap_mm) + along_y * edge_excess(sides[1], gap_mm)
 
 

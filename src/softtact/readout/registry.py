@@ -45,6 +45,31 @@ class Samples:
 
 
 @dataclass(frozen=True)
+class PlaneMotion:
+    """The motion of a plane sensing surface at the points of its map, with contact. Frame: the sensor's, z out of the surface."""
+
+    x_mm: np.ndarray
+    """(nx,): columns of the map at rest."""
+    y_mm: np.ndarray
+    """(ny,): rows of the map at rest."""
+    displacement_mm: np.ndarray
+    """(step, ny, nx, 3): of the surface; z is negative where it is pressed down."""
+    traction_mpa: np.ndarray
+    """(step, ny, nx, 3): of the object on the surface, per area at rest; pressing down is negative in z."""
+    slip: np.ndarray
+    """(step, ny, nx) bool: which points touch, and slide on the object in this step."""
+    gap_mm: np.ndarray
+    """(step, ny, nx): along z to the object, whose underside is at displacement z + gap; 0 in contact up to the solver's tolerance,
+    inf where no object is above."""
+
+    @classmethod
+    def at_rest(cls, x_mm: np.ndarray, y_mm: np.ndarray) -> "PlaneMotion":
+        """One step without any object."""
+        shape = (1, len(y_mm), len(x_mm))
+        return cls(x_mm, y_mm, np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape, dtype=bool), np.full(shape, np.inf))
+
+
+@dataclass(frozen=True)
 class SurfaceMotion:
     """The motion of a sensing surface in a press: the input of readouts at each load step."""
 
@@ -62,6 +87,9 @@ class SurfaceMotion:
     """Of a face or the sensing surface: gap in mm between it and the object along the normal, negative in penetration."""
     thinning_mm: np.ndarray | None = None
     """(step, y, x): decrease of the layers' thickness in mm at the points of the sensor's map; None without layers."""
+    plane: PlaneMotion | None = None
+    """Displacement, traction, slip and gap at the points of the map, where the surface is plane and the model gives them: at rest,
+    and in the elastic model's presses with a motion."""
 
 
 class Readout(Protocol):

@@ -29,6 +29,7 @@ class Capacitance(FiniteSection):
         if surface.thinning_mm is None or not isinstance(surface.spec, BaseSpec):
             raise InputError(f"{surface.spec.name} has no layers between electrodes, which the readout 'capacitance' reads; take "
                              "points or strip.")
+        surface.spec.need_taxels("the readout 'capacitance'")
         return labelled(counts_of(surface.spec, surface.thinning_mm), ("step", "row", "column"),     # type: ignore[arg-type]
                         units="counts")
 

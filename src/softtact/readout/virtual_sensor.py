@@ -172,7 +172,7 @@ def make_specimen(spec: "SensorSpec", *, seed: int, settings: VirtualSensorSetti
     if not settings.electrode_spacing_mm < min(electrode_sides(spec)):
         raise InputError(f"virtual_sensor: electrode_spacing_mm is {settings.electrode_spacing_mm:g}, and a taxel "
                          f"{min(electrode_sides(spec)):g} mm wide; leave something of the electrode.")
-    rng, shape = np.random.default_rng([seed, 0]), (spec.taxels.rows, spec.taxels.columns)
+    rng, shape = np.random.default_rng([seed, 0]), _grid_of(spec)
     gain, offset, sheet = rng.standard_normal((3, *shape))
     dead = rng.random(shape) < settings.dead_share
     for number in settings.dead_taxels:
@@ -193,7 +193,7 @@ def taxel_capacitance(spec: "SensorSpec", displacement_mm: np.ndarray, *, sheet_
     sheet_excess_mm: number or (rows, columns), excess thickness of the sheet over a taxel;  shift_mm: (x, y) of the object
     """
     spacing = settings.electrode_spacing_mm
-    extra = np.broadcast_to(sheet_excess_mm, (spec.taxels.rows, spec.taxels.columns))
+    extra = np.broadcast_to(sheet_excess_mm, _grid_of(spec))
     air = equivalent_air_gap(spec, displacement_mm)
     if np.any(extra):
         inverse = 1 / (air + extra[:, :, *[None] * air.ndim] / spec.dielectric.relative_permittivity)  # (row, column, ..., y, x)
@@ -264,3 +264,9 @@ def converted(counts: np.ndarray, *, noise: float | np.ndarray = 0.0, step: floa
     noisy = counts + noise
     rounded = step * np.round(noisy / step) if step > 0 else noisy
     return np.where(dead, 0.0, np.clip(rounded, 0.0, largest))
+
+
+def _grid_of(spec):
+    """(rows, columns) of the taxels."""
+    taxels = spec.need_taxels("the virtual sensor")
+    return taxels.rows, taxels.columns

@@ -64,7 +64,7 @@ class GraspEnv(gymnasium.Env):
         self._mesh = _mesh_of(mesh, unit)
         self.largest_force_n = float(largest_force_n)
         self._memory = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n, place_step_mm)
-        taxels = self._sensor.spec.taxels
+        taxels = self._sensor.spec.need_taxels("the environment")
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({
             "tactile": gymnasium.spaces.Box(0, 65535, (2, taxels.rows, taxels.columns), np.uint16),

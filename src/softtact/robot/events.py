@@ -168,11 +168,11 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
     options: policy, tolerance_mm, as for `Sensor.press`
     Raises InputError for a force out of the sensor's range, ConvergenceError as a press does.
     """
-    spec = sensor.spec
+    spec, taxels = sensor.spec, sensor.spec.need_taxels("a record of grasps")
     events = len(record.event_row)
     forces = np.round(np.maximum(-record.force_n[record.event_row, :, 2], 0.0), _FORCE_DIGITS) + 0.0
     poses = record.object_pose_sensor[record.event_row]
-    maps = EventMaps(np.zeros((events, 2, *spec.map_shape)), np.zeros((events, 2, spec.taxels.rows, spec.taxels.columns)),
+    maps = EventMaps(np.zeros((events, 2, *spec.map_shape)), np.zeros((events, 2, taxels.rows, taxels.columns)),
                      np.zeros((events, 2)), np.zeros((events, 2, 2)), np.full((events, 2), NO_PRESS, dtype=object),
                      np.full((events, 2), "", dtype=object), np.ones((events, 2), dtype=np.int8),
                      np.full((events, 2), "", dtype=object))

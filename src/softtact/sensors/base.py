@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, V
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, FiniteSection, Taxels
+from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, FiniteSection, Sides, Taxels
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 DEFAULT_KIND = "frusta"     # of a file that states none
@@ -97,10 +97,10 @@ class BaseSpec(Specification):
     Frame: origin at the centre of the sensing surface, x and y along the sides, z outwards.
     """
 
-    footprint_mm: tuple[PositiveFloat, PositiveFloat]
+    footprint_mm: Sides
     map_shape: tuple[PositiveInt, PositiveInt]
     largest_counts: PositiveFloat = Field(2400.0, description="of the readout's converter; pictures end there")
-    taxels: Taxels
+    taxels: Taxels | None = None
     elastic_layer: ElasticLayer
     edge: EdgeField = Edge()
     calibration: CalibrationBlock | None = None
@@ -159,14 +159,15 @@ class BaseSpec(Specification):
     def in_words(self) -> str:
         """Name, size and counts in one line."""
         sides = " x ".join(f"{side:g}" for side in self.footprint_mm)
-        return (f"{self.name}: {sides} mm, {self.parts_in_words}, {self.taxels.rows} x {self.taxels.columns} taxels, "
+        taxels = f"{self.taxels.rows} x {self.taxels.columns} taxels" if self.taxels else "no taxels"
+        return (f"{self.name}: {sides} mm, {self.parts_in_words}, {taxels}, "
                 f"maps of {self.map_shape[0]} x {self.map_shape[1]} points")
 
     def check_for(self, kind: str) -> None:
         """Raise InputError if a model (elastic, foundation, hyperelastic) cannot press it: no frusta, or no middle row."""
         if kind == "foundation":
             self.need_frusta("the foundation model", "press with elastic or hyperelastic")
-        if kind in ("elastic", "foundation") and not all(count % 2 for count in self.map_shape):
+        if kind in ("elastic", "foundation") and not self.edge.far and not all(count % 2 for count in self.map_shape):
             raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
                              "models need; write odd numbers.")
 
@@ -178,7 +179,14 @@ class BaseSpec(Specification):
     @property
     def stated_readouts(self) -> dict[str, ReadoutEntry]:
         """The readouts of the file, by default the taxels' counts."""
-        return self.readouts or {"taxels": ReadoutEntry(kind="capacitance")}
+        return self.readouts or ({"taxels": ReadoutEntry(kind="capacitance")} if self.taxels else {})
+
+    def need_taxels(self, what: str) -> Taxels:
+        """The taxels, which `what` needs; InputError where the sensor has none."""
+        if self.taxels is None:
+            raise InputError(f"{self.name} has no taxels, which {what} needs; add 'taxels: {{rows, columns}}' to its file, or "
+                             "take a sensor that has them.")
+        return self.taxels
 
     def _check(self, where: str) -> None:
         super()._check(where)
@@ -186,9 +194,10 @@ class BaseSpec(Specification):
         if np.isfinite(below) and below >= self.held_height_mm:
             raise InputError(f"{where}, at 'edge.held.sides_below_mm': {below:g} mm is not less than the height of the layers, "
                              f"{self.held_height_mm:g} mm, so nothing is held; make it smaller, or write 'held: free'.")
-        fault = self.calibration and self.calibration.fault(self.taxels.rows, self.taxels.columns)
-        if fault:
-            raise InputError(f"{where}: {fault}; calibrate the sensor again.")
+        if self.calibration is not None:
+            taxels = self.need_taxels("a calibration")
+            if fault := self.calibration.fault(taxels.rows, taxels.columns):
+                raise InputError(f"{where}: {fault}; calibrate the sensor again.")
         if not self.base_held and not np.isfinite(below):
             raise InputError(f"{where}, at 'edge.held': with support 'none' and free sides nothing holds the sensor; hold the "
                              "sides, or write support: base.")

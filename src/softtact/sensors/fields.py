@@ -42,7 +42,9 @@ def _or_stated(kind: Any) -> BeforeValidator:
 
 
 _NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_PoissonsRatio = Annotated[float, Field(gt=-1.0, lt=0.5)]
 Length = Annotated[PositiveFloat, _or_stated(PositiveFloat)]
+Sides = Annotated[tuple[PositiveFloat, PositiveFloat], _or_stated(tuple[PositiveFloat, PositiveFloat])]
 Coefficient = Annotated[_NotNegative, _or_stated(_NotNegative)]
 Flag = Annotated[bool, _or_stated(bool)]
 
@@ -57,8 +59,8 @@ class Taxels(FiniteSection):
 class ElasticLayer(FiniteSection):
     """Constants of the single linear layer that stands for all layers in the elastic model."""
 
-    young_mpa: PositiveFloat
-    poisson: Annotated[float, Field(gt=-1.0, lt=0.5)]
+    young_mpa: Length
+    poisson: Annotated[_PoissonsRatio, _or_stated(_PoissonsRatio)]
 
 
 # --- support of a sensor's rim ---
@@ -67,6 +69,7 @@ class ElasticLayer(FiniteSection):
 #     edge: {held: sides}                       the shell ends flush with the sensing surface: the whole side faces are held
 #     edge: {held: {sides_below_mm: 1.5}}       the shell ends 1.5 mm below it: side faces are held from there down, free above
 #     edge: {held: free}                        no shell: side faces are free
+#     edge: {held: far}                         no shell, and side faces too far from every contact to matter (gels with a camera)
 # The shell is rigid and as wide as `shell_width_mm`. An object that reaches over it comes down until it meets the shell's top,
 # which carries all further force. So with `held: sides` a flat object wider than the sensor rests on the shell at first
 # touch.
@@ -80,10 +83,10 @@ class SidesBelow(FiniteSection):
 
 def _held(value: Any) -> Any:
     """Refuse other values in one sentence; the errors of a pydantic union would name each of its members."""
-    if isinstance(value, SidesBelow) or value in ("sides", "free"):
+    if isinstance(value, SidesBelow) or value in ("sides", "free", "far"):
         return value
     if not (isinstance(value, dict) and set(value) == {"sides_below_mm"}):
-        raise ValueError(f"it is {value!r}; write sides, free, or {{sides_below_mm: h}} with h in mm")
+        raise ValueError(f"it is {value!r}; write sides, free, far, or {{sides_below_mm: h}} with h in mm")
     height = plain_value(value["sides_below_mm"])
     if isinstance(height, bool) or not isinstance(height, int | float) or not 0 < height < np.inf:
         raise ValueError(f"its sides_below_mm is {height!r}; give a height in mm above 0")
@@ -91,9 +94,9 @@ def _held(value: Any) -> Any:
 
 
 class Edge(FiniteSection):
-    """Support of the rim: `held` is sides, free or {sides_below_mm: h}; each may also be given in place of the whole block."""
+    """Support of the rim: `held` is sides, free, far or {sides_below_mm: h}; each may also be given in place of the whole block."""
 
-    held: Annotated[Literal["sides", "free"] | SidesBelow, BeforeValidator(_held)] = "sides"
+    held: Annotated[Literal["sides", "free", "far"] | SidesBelow, BeforeValidator(_held)] = "sides"
     shell_width_mm: Length = 2.0
 
     @property
@@ -108,11 +111,16 @@ class Edge(FiniteSection):
         """One clause for attributes of results."""
         if isinstance(self.held, SidesBelow):
             return f"sides held from {self.held.sides_below_mm:g} mm below the surface on"
-        return "sides held up to the surface" if self.held == "sides" else "sides free"
+        return {"sides": "sides held up to the surface", "free": "sides free", "far": "sides too far to matter"}[self.held]
+
+    @property
+    def far(self) -> bool:
+        """Whether the sides are too far from every contact to matter: the elastic model then takes an infinitely wide layer."""
+        return self.held == "far"
 
 
 def _short(value: Any) -> Any:
-    """`sides`, `free` and `{sides_below_mm: h}` in place of a whole `edge`."""
+    """`sides`, `free`, `far` and `{sides_below_mm: h}` in place of a whole `edge`."""
     if isinstance(value, str):
         return {"held": value}
     if isinstance(value, dict) and "sides_below_mm" in value and "held" not in value:

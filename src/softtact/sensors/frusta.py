@@ -6,7 +6,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec
-from softtact.sensors.fields import Coefficient, FiniteSection, Flag, Length
+from softtact.sensors.fields import Coefficient, FiniteSection, Flag, Length, Taxels
 
 # Frustum orientations for the two printed diameters: the narrow end as the tip, or the wide one, as the paper's text has it.
 ORIENTATIONS = ("default", "as_printed")
@@ -48,6 +48,7 @@ class SensorSpec(BaseSpec):
     """A layered sensor on frusta. Frame: origin at the centre of the sensing surface, x and y along the sides, z outwards."""
 
     kind: Literal["frusta"] = "frusta"
+    taxels: Taxels
     dielectric: Dielectric
     cover: Cover
     tips_bonded: Flag = True
@@ -111,6 +112,9 @@ class SensorSpec(BaseSpec):
 
     def _check(self, where: str) -> None:
         super()._check(where)
+        if self.edge.far:
+            raise InputError(f"{where}, at 'edge.held': 'far' is for plain layers on a base, whose elastic model is infinitely "
+                             "wide; write sides, free, or {sides_below_mm: h}.")
         if min(self.frusta_counts) < 1:
             raise InputError(f"{where}: no frustum of pitch {self.dielectric.frusta.pitch_mm} mm fits on the footprint "
                              f"{self.footprint_mm} mm; enlarge the footprint or reduce the pitch.")

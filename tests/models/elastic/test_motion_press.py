@@ -143,6 +143,22 @@ def test_forces_torques_and_slip_have_the_documented_signs(surface):
     assert found.slip[-1][touched].max() > 0.2
 
 
+def test_tractions_gaps_and_sliding_points_on_the_map_are_those_of_the_contact(surface):
+    """Tractions sum to the force to rounding, as nodes share theirs; the object is on the surface where it presses, else above."""
+    motion = Motion().press(depth_mm=0.2).slide(x_mm=0.05).slide(x_mm=0.6, steps=2)
+    found = move(surface, standing(PUNCH), motion, friction=0.3)
+    sides = [np.where(np.arange(13) % 12, 1.0, 0.5)] * 2
+    area = np.outer(*sides) * 0.8**2
+    np.testing.assert_allclose((found.traction_mpa * area[..., None]).sum(axis=(1, 2)), found.force_n, rtol=1e-9, atol=1e-12)
+    touches = np.isfinite(found.slip)
+    assert np.abs(found.gap_mm[touches]).max() < 1e-5                    # mm: the displacement is in single precision
+    under = np.isfinite(found.gap_mm)
+    assert (found.gap_mm[under] > -1e-5).all() and not under[:, 0].any() and (under >= touches).all()
+    assert not found.slides[0].any() or found.slip[0][found.slides[0]].min() > 0
+    np.testing.assert_array_equal(found.slides[-1], touches[-1])         # gross sliding
+    assert found.slides[1].sum() < found.slides[-1].sum()                # partial slip before
+
+
 def test_lifted_off_the_object_leaves_no_force_and_touches_again(surface):
     motion = Motion().press(depth_mm=0.2).step(ways={"z": 0.3}).step(ways={"x": 0.5}).step(ways={"z": -0.3})
     found = move(surface, standing(BALL), motion, friction=0.3)

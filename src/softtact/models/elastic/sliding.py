@@ -271,6 +271,12 @@ class ElasticMotion:
     slip: np.ndarray
     """(step, y, x) in mm: the length of the path on which a point has slid on the object since it last came to touch; nan where it
     does not touch. Slip is the surface's tangential displacement less the object's; 0 where a point has stuck throughout."""
+    traction_mpa: np.ndarray
+    """(step, y, x, 3): the object's force on the surface per area at rest, the mean around a point of the map's grid."""
+    slides: np.ndarray
+    """(step, y, x) bool: which points touch and have slid in this step."""
+    gap_mm: np.ndarray
+    """(step, y, x): along z from the surface to the object; inf where no object is above."""
     contact_area_mm2: np.ndarray
     """(step,): area of the nodes under pressure."""
     penetration_mm: np.ndarray
@@ -313,9 +319,9 @@ def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray
             states.append(state)
             counts.append(count)
     except ConvergenceError as error:
-        error.result = _result(compliance, states, counts) if counts else None
+        error.result = _result(mover, states, counts) if counts else None
         raise
-    return _result(compliance, states, counts)
+    return _result(mover, states, counts)
 
 
 def check_motion(motion: Motion) -> None:
@@ -363,14 +369,17 @@ def _increments(mover, state, aside, down, load):
                     for way, share in ((np.linalg.norm(aside), _ASIDE), (abs(down), _DOWN))))
 
 
-def _result(compliance, states, counts):
+def _result(mover, states, counts):
     """The numbers and maps of the states at the steps' ends; the first state is the start."""
-    ends, grid = states[1:], compliance.grid
-    forces = np.array([state.force_n for state in ends])
+    compliance, ends = mover.compliance, states[1:]
+    grid, forces = compliance.grid, np.array([state.force_n for state in ends])
+    sunk = np.stack([_sunk(compliance, state) for state in ends])
     return ElasticMotion(
         depth_mm=np.array([state.position[2] for state in ends]),
         displacement_mm=np.stack([_displacement(compliance, state) for state in ends]),
-        sunk_mm=np.stack([_sunk(compliance, state) for state in ends]),
+        sunk_mm=sunk, traction_mpa=np.stack([_traction(grid, state) for state in ends]),
+        slides=np.stack([_on_map(grid, slid_since(before, state), False) for before, state in zip(states, ends, strict=False)]),
+        gap_mm=np.stack([_gap(mover, state, down[::2, ::2]) for state, down in zip(ends, sunk, strict=True)]),
         force_n=forces, torque_nmm=np.stack([_torque(grid, state) for state in ends]),
         slip=np.stack([_slip_map(grid, state) for state in ends]),
         contact_area_mm2=np.array([grid.areas(np.flatnonzero(state.normal > 0)).sum() for state in ends]),
@@ -405,6 +414,41 @@ def _torque(grid, state):
     return np.array([(y * fz).sum(), -(x * fz).sum(), (x * fy - y * fx).sum()])
 
 
+def slid_since(before: SlidingState, state: SlidingState) -> np.ndarray:
+    """Which points (n,) touch and have slid since an earlier state."""
+    return (state.normal > 0) & (state.path > 0) & (state.path != before.path)
+
+
+def _traction(grid, state):
+    """(y, x, 3) in MPa on the map's grid: nodes between its points share their forces among these."""
+    force = np.column_stack([state.tangential, -state.normal]).T.reshape(3, *grid.shape)
+    for axis in (1, 2):
+        line = np.moveaxis(grid.with_held_sides(force) if axis == 1 else force, axis, 0)
+        shared = line[::2].copy()
+        shared[:-1] += 0.5 * line[1::2]
+        shared[1:] += 0.5 * line[1::2]
+        force = np.moveaxis(shared, 0, axis)
+    inside = [np.where(np.arange(count) % (count - 1), 1.0, 0.5) for count in force.shape[1:]]
+    return np.moveaxis(force / (4 * np.prod(grid.step) * np.outer(*inside)), 0, -1)
+
+
+def _gap(mover, state, down):
+    """(y, x) in mm between surface and object on the map's grid, the surface being `down` (y, x) in mm."""
+    grid = mover.compliance.grid
+    x, y = (np.concatenate([line[:1] - step, line, line[-1:] + step])[::2] if not grid.sides else line[::2]
+            for line, step in zip((grid.x, grid.y), grid.step, strict=True))
+    place = np.stack(np.meshgrid(x, y), axis=-1) - state.position[:2]
+    inner = slice(None) if grid.sides else slice(1, -1)
+    place[inner, inner] = state.place[grid.second_nodes].reshape(*grid.every_second.shape, 2)
+    heights = mover.heights(place.reshape(-1, 2)).reshape(down.shape)
+    return np.where(heights < 0.5 * NO_CONTACT_MM, heights - state.position[2] + down, np.inf)
+
+
 def _slip_map(grid, state):
-    path = np.where(state.normal > 0, state.path, np.nan)[grid.second_nodes].reshape(grid.every_second.shape)
-    return path if grid.sides else np.pad(path, 1, constant_values=np.nan)
+    return _on_map(grid, np.where(state.normal > 0, state.path, np.nan), np.nan)
+
+
+def _on_map(grid, values, beside):
+    """Values (n,) of nodes on the map's grid (y, x), and `beside` on sides that are held."""
+    inner = values[grid.second_nodes].reshape(grid.every_second.shape)
+    return inner if grid.sides else np.pad(inner, 1, constant_values=beside)
