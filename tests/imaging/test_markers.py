@@ -1,0 +1,114 @@
+"""The detector of markers, on images drawn with known places, and on a real gel's picture where it is at hand."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from softtact.errors import InputError
+from softtact.imaging.markers import find_markers, read_image, track
+
+FAINTEST = 0.37     # contrast of the faintest of 99 markers on a real gel (FOTS' marker_dilate.png, measured here below)
+REAL = Path(os.environ.get("SOFTTACT_TEST_DATA", "nowhere")) / "gel/fots"
+FINE = 16           # parts of a pixel's side in a drawn image: it is drawn by counting, by no formula of the package
+
+
+def drawn(places, *, radius=5.8, contrast=0.68, noise=0.0, shape=(240, 320), blur=0.8, seed=1):
+    """An image (rows, columns, 3) with dark discs at places (n, 2) px over a coloured light that changes across it."""
+    light = np.ones(shape)
+    part = (np.arange(FINE) + 0.5) / FINE - 0.5
+    for x, y in places:
+        left, top = int(x - radius) - 2, int(y - radius) - 2
+        columns, rows = np.arange(left, left + 2 * int(radius) + 6), np.arange(top, top + 2 * int(radius) + 6)
+        columns, rows = columns[(columns >= 0) & (columns < shape[1])], rows[(rows >= 0) & (rows < shape[0])]
+        fine_x, fine_y = (columns[:, None] + part).ravel() - x, (rows[:, None] + part).ravel() - y
+        inside = (fine_x**2 + fine_y[:, None]**2 < radius**2).reshape(len(rows), FINE, len(columns), FINE).mean(axis=(1, 3))
+        light[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1] -= contrast * inside
+    light = gaussian_filter(light, blur, mode="nearest")
+    y, x = np.mgrid[:shape[0], :shape[1]] / 320.0
+    colours = np.stack([230 - 60 * x, 150 + 40 * y, 160 + 50 * x], axis=-1) * light[..., None]
+    colours += noise * 255 * np.random.default_rng(seed).standard_normal(colours.shape)
+    return np.clip(np.round(colours), 0, 255).astype(np.uint8)
+
+
+def grid(pitch=28.7, shape=(240, 320), margin=14.0, scatter=0.5, seed=3):
+    """Places (n, 2) of a grid whose markers lie off the middles of pixels by all fractions."""
+    x, y = np.meshgrid(np.arange(margin, shape[1] - margin, pitch), np.arange(margin, shape[0] - margin, pitch))
+    places = np.column_stack([x.ravel(), y.ravel()])
+    return places + np.random.default_rng(seed).uniform(-scatter, scatter, places.shape)
+
+
+def errors(places, found):
+    near = track(places, found.px, limit_px=5.0)
+    assert not np.isnan(near).any(), "a marker was not found"
+    return near - places
+
+
+def test_drawn_markers_are_found_within_a_twentieth_of_a_pixel_each():
+    places = grid()
+    off = errors(places, find_markers(drawn(places)))
+    assert np.abs(off).max() < 0.05 and np.abs(off.mean(axis=0)).max() < 0.01
+
+
+def test_the_bias_stays_below_a_twentieth_of_a_pixel_at_the_faintest_real_contrast_and_noise():
+    """0.008 of the light: the noise between the markers of the real picture."""
+    places = grid()
+    off = errors(places, find_markers(drawn(places, contrast=FAINTEST, noise=0.008)))
+    assert np.abs(off.mean(axis=0)).max() < 0.05 and off.std() < 0.1
+
+
+def test_nothing_but_markers_is_found():
+    places = grid()
+    assert len(find_markers(drawn(places, noise=0.008)).px) == len(places)
+
+
+@pytest.mark.parametrize("radius", [2.5, 4.0, 9.0])
+def test_the_radius_is_found_from_the_image(radius):
+    found = find_markers(drawn(grid(pitch=6 * radius), radius=radius))
+    assert found.radius_px == pytest.approx(radius, rel=0.12)
+
+
+def test_a_marker_that_the_border_cuts_to_a_sliver_is_left_out_and_one_cut_slightly_is_told():
+    places = np.array([[-3.0, 100.0], [100.0, 100.0], [200.0, 237.0]])
+    found = find_markers(drawn(places), radius_px=5.8)
+    assert len(found.px) == 2
+    assert found.inside[0] == 1.0 and 0.6 < found.inside[1] < 1.0
+
+
+def test_markers_are_followed_to_the_nearest_and_lost_beyond_the_limit():
+    rest = np.array([[10.0, 10.0], [40.0, 10.0], [70.0, 10.0]])
+    now = np.array([[41.0, 12.0], [13.0, 10.0], [85.0, 10.0]])
+    places = track(rest, now, limit_px=8.0)
+    assert np.array_equal(places[:2], [[13.0, 10.0], [41.0, 12.0]]) and np.isnan(places[2]).all()
+
+
+def test_two_markers_never_take_the_same_place():
+    places = track(np.array([[0.0, 0.0], [6.0, 0.0]]), np.array([[5.0, 0.0]]), limit_px=10.0)
+    assert np.isnan(places[0]).all() and np.array_equal(places[1], [5.0, 0.0])
+
+
+def test_an_image_without_markers_is_refused_in_a_sentence():
+    with pytest.raises(InputError, match="shows no marker of radius"):
+        find_markers(drawn(np.zeros((0, 2)), noise=0.008), radius_px=5.8)
+
+
+def test_a_limit_that_is_no_length_is_refused():
+    with pytest.raises(InputError, match="limit_px is 0"):
+        track(np.zeros((1, 2)), np.zeros((1, 2)), limit_px=0)
+
+
+def test_a_file_that_is_no_image_is_named(tmp_path):
+    (tmp_path / "a.png").write_text("no picture")
+    with pytest.raises(InputError, match="a.png: not a readable image"):
+        read_image(tmp_path / "a.png")
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="the real gel's picture is not at hand")
+def test_all_99_markers_of_a_real_gel_are_found_and_no_other():
+    labelled = np.loadtxt(REAL / "marker_dilate.csv", delimiter=",", skiprows=1)
+    found = find_markers(read_image(REAL / "marker_dilate.png"))
+    near = track(labelled[:, :2] + labelled[:, 2:], found.px, limit_px=8.0)
+    assert len(found.px) == 99 and not np.isnan(near).any()
+    assert found.contrast.min() > FAINTEST
