@@ -52,3 +52,22 @@ def test_the_penalty_of_a_plate_pressed_in_eight_steps_is_no_larger_than_in_one(
     largest = [step.state.histories[0].stiffness for step in SolidPath(body, {"plate": motion}).run()]
     (once,) = SolidPath(body, {"plate": Motion().step(ways={"z": -0.16})}).run()
     assert max(largest) <= once.state.histories[0].stiffness
+
+
+@pytest.mark.parametrize("way_mm", [1.0, 1000.0])
+def test_a_block_that_nothing_holds_moves_freely_although_rounding_leaves_some_force(way_mm):
+    """Without loads every share of them is zero: only rounding tells that the balance is found."""
+    body = SolidBody(box((-5, -5, 0), (5, 5, 10), (2, 2, 2)), {"body": make_law("neo_hooke", {"c10": 0.1})}, held={"z0": "xy"},
+                     carried={"grip": ((0, 0, 10), ["z1"], "z")})
+    (step,) = SolidPath(body, {"grip": Motion().step(ways={"z": way_mm})}).run()
+    assert step.state.displacement[:, 2] == pytest.approx(way_mm, rel=1e-12) and step.increments == 1
+    pulled = 0.6 * 100 * 1e-9       # N: Young's modulus, area, and a strain that no press resolves
+    assert step.residual_n <= body.rounding_n(step.state) < pulled
+
+
+def test_a_step_that_is_too_large_is_divided_with_its_reason_and_no_force_of_the_balance_before():
+    told = []
+    body = SolidBody(box((-1, -1, 0), (1, 1, 2), (2, 2, 2)), {"body": make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=2000)},
+                     held={"z0": "xyz"}, carried={"grip": ((0, 0, 2), ["z1"])})
+    (step,) = SolidPath(body, {"grip": Motion().step(ways={"z": -1.3})}, tell=told.append).run()
+    assert step.increments > 1 and told[0] == "increment divided: The prescribed step turns an element inside out."

@@ -36,6 +36,7 @@ from softtact.progress import Watch
 _CHUNK = 256  # elements whose dense tangents are in memory at once, for each thread
 _COUPLED, _MOST_COUPLED = 1e-6, 60  # relative error and iterations of GMRES
 _PROBE = 1e-7  # mm or radians, for derivatives by a frame's freedom
+_ROUND_OFF = 8 * np.finfo(float).eps  # of a nodal force, a sum of some tens of terms each known to eps
 AXES = "xyz"
 
 
@@ -251,6 +252,25 @@ class SolidBody:
     def residual(self, state: SolidState) -> np.ndarray:
         """Unbalanced forces (unknowns,) in N."""
         return state.force.ravel()[self.free]
+
+    def rounding_n(self, state: SolidState) -> float:
+        """Unbalanced force in N that rounding leaves, whatever the loads: no state can be nearer to balance.
+
+        A displacement is known to eps |u| and a gradient F = 1 + du/dx of elements of length h to eps (1 + |u| / h), so a nodal
+        force to that times the confined modulus K + 4/3 mu and an element's area.
+        """
+        farthest, largest = float(np.abs(state.displacement).max(initial=0.0)), 0.0
+        for _, nodes, block in self.blocks:
+            length = float(self._lengths(nodes).min())
+            force = (block.law.bulk_modulus + 4 / 3 * block.law.mu0) * block.volume / len(nodes) / length
+            largest = max(largest, force * (1.0 + farthest / length))
+        return _ROUND_OFF * largest
+
+    def _lengths(self, nodes: np.ndarray) -> np.ndarray:
+        """Least extents (e,) in mm of elements (e, k) along the axes in which they extend."""
+        extents = np.ptp(self.points[nodes], axis=1)
+        least: np.ndarray = np.where(extents > 0, extents, np.inf).min(axis=1)
+        return least
 
     def frame_loads(self, state: SolidState) -> np.ndarray:
         """(frames, 6) in N and N mm: the loads under which the frames are in balance, about their reference points.

@@ -77,7 +77,8 @@ class _Balance:
         return float(max(np.abs(self.body.residual(state)).max(initial=0.0), np.abs(off).max(initial=0.0)))
 
     def balanced(self, state: SolidState, residual: float) -> bool:
-        return not self.pending and residual <= self.settings.relative_residual * max(state.size, 1e-9)
+        # Without loads, as in a body that moves freely, rounding is all that is left.
+        return not self.pending and residual <= max(self.settings.relative_residual * state.size, self.body.rounding_n(state))
 
     def step(self, state: SolidState) -> tuple[SolidState, Any]:
         body, unknown = self.body, self.target.unknown
@@ -234,6 +235,8 @@ def _settled(body, state, target, settings, pending, iterations):
         problem = _Balance(body, settings, target, pending)
         found: Solution = solve(problem, state, max_iterations=settings.max_iterations)
         iterations += found.iterations
+        if found.state is None and problem.pending:
+            raise _UnbalancedError("The prescribed step turns an element inside out.", iterations)
         if found.state is None:
             raise _UnbalancedError(
                 f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations.", iterations
