@@ -83,11 +83,12 @@ class Pinhole:
         if not any(self.distortion):
             return seen
         ideal = seen.copy()
-        for _ in range(_PASSES):
-            change = seen - self.distorted(ideal)
-            ideal = ideal + change
-            if not (np.abs(change) > _CLOSE).any():
-                return ideal
+        with np.errstate(over="ignore", invalid="ignore"):      # of directions that have no inverse
+            for _ in range(_PASSES):
+                change = seen - self.distorted(ideal)
+                ideal = ideal + change
+                if not (np.abs(change) > _CLOSE).any():
+                    break
         return np.where(np.abs(change).max(axis=-1, keepdims=True) < 1e-3 / self.focal_px, ideal, np.nan)
 
     def pixels(self) -> np.ndarray:

@@ -28,7 +28,7 @@ from softtact.press.result import PressResult
 from softtact.press.solid import load_solid, press_body, press_pad, surface_of
 from softtact.press.task import PressTask, checked_forces
 from softtact.press.validity import flag_buried, flag_overloaded
-from softtact.readout import points, strip, taxels  # registered as they are imported  # noqa: F401
+from softtact.readout import camera, depth, markers, points, strip, taxels  # registered as they are imported  # noqa: F401
 from softtact.readout.registry import PlaneMotion, SurfaceMotion
 from softtact.sensors.library import material_file
 from softtact.sensors.specification import AnySpec

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError, model_serializer
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, PrivateAttr, ValidationError, model_serializer
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
@@ -13,13 +13,14 @@ from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLa
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 DEFAULT_KIND = "frusta"     # of a file that states none
+_FILES_OF_READOUTS = ("shading", "background")     # keys of readouts that name files
 
 
 class ReadoutEntry(BaseModel):
     """A readout of a sensor: its `kind`, and the keys of that kind."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
-    kind: str = Field(description="one of the registered kinds: capacitance, points, strip")
+    kind: str = Field(description="one of the registered kinds: camera, capacitance, depth, markers, points, strip")
 
 
 class Specification(FiniteSection):
@@ -31,6 +32,12 @@ class Specification(FiniteSection):
     name: str
     force_range_n: tuple[float, PositiveFloat]
     readouts: dict[str, ReadoutEntry] = {}
+    _folder: Path = PrivateAttr(Path())
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the sensor's file, to which paths in it are relative."""
+        return self._folder
 
     @property
     def stated_readouts(self) -> dict[str, ReadoutEntry]:
@@ -45,7 +52,9 @@ class Specification(FiniteSection):
     @property
     def paths(self) -> list[Path]:
         """All files of the sensor besides its YAML file."""
-        return []
+        named = [self.folder / str(value) for entry in self.readouts.values() for key, value in (entry.model_extra or {}).items()
+                 if key in _FILES_OF_READOUTS]
+        return [path for path in named if path.is_file()]
 
     def need_layers(self) -> None:
         """Raise InputError if the sensor does not consist of layers."""
@@ -55,6 +64,8 @@ class Specification(FiniteSection):
 
     def _found_in(self, folder: Path) -> None:
         """Store the folder of the sensor's file, to which its paths are relative."""
+        if self.readouts:       # which alone need it: equal contents are equal sensors, from wherever they were read
+            self._folder = folder
 
     def _check(self, where: str) -> None:
         """Refuse values that are valid one by one but not together."""

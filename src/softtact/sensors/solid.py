@@ -14,7 +14,7 @@
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
-from pydantic import Field, PositiveFloat, PrivateAttr
+from pydantic import Field, PositiveFloat
 
 from softtact.errors import InputError
 from softtact.materials.cards import law_from_card, load_card
@@ -71,7 +71,9 @@ class SolidSpec(Specification):
     held: Annotated[dict[str, str], Field(min_length=1)]
     contact: ContactFace
     readings: ReadingPlaces | None = Field(None, description="short for a readout of the name and the kind points")
-    _folder: Path = PrivateAttr(Path())     # of the sensor's file, to which its paths are relative
+
+    def _found_in(self, folder: Path) -> None:
+        self._folder = folder      # of its mesh
 
     @property
     def mesh_path(self) -> Path:
@@ -81,7 +83,7 @@ class SolidSpec(Specification):
     @property
     def paths(self) -> list[Path]:
         """All files of the sensor besides its YAML file."""
-        return [self.mesh_path, *(self._folder / region.card for region in self.regions.values() if region.card)]
+        return [*super().paths, self.mesh_path, *(self._folder / region.card for region in self.regions.values() if region.card)]
 
     @property
     def stated_readouts(self) -> dict[str, ReadoutEntry]:
@@ -89,9 +91,6 @@ class SolidSpec(Specification):
         if self.readings is None:
             return self.readouts
         return {"points": ReadoutEntry(kind="points", **self.readings.model_dump()), **self.readouts}
-
-    def _found_in(self, folder: Path) -> None:
-        self._folder = folder
 
     def need_layers(self) -> NoReturn:
         """Refuse uses that need a sensor of layers."""
