@@ -18,6 +18,8 @@ study: .venv/installed
 	$(SNAKEMAKE)
 	@echo "Open results/default/report.html"
 
+# Snakemake looks for jobs every second in small studies; workflow/profiles/default says why less often in large ones.
+$(TINY_STUDIES): SNAKEMAKE += --max-jobs-per-timespan 1000/1s
 $(TINY_STUDIES) skin probe grasps decide: .venv/installed
 	$(SNAKEMAKE) --configfile config/$(subst -,_,$@).yaml
 	@echo "Open results/$(subst -,_,$@)/report.html"

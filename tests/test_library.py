@@ -139,6 +139,7 @@ def test_a_command_whose_extra_is_missing_says_which_to_install(package, argumen
                           f"run: pip install 'softtact[{extra}]'.\n")
 
 
+@pytest.mark.slow
 def test_a_video_needs_the_extra_and_a_picture_does_not(tmp_path):
     import numpy as np
     from skimage import io

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pandas as pd
+import pytest
 import yaml
 
 from softtact.cli import main
@@ -11,6 +12,7 @@ from softtact.files import read_dataset
 ROOT = Path(__file__).resolve().parents[1]
 
 
+@pytest.mark.slow
 def test_the_command_writes_tables_pictures_fields_and_a_page(tmp_path, capsys):
     design = yaml.safe_load((ROOT / "config/tiny_probe.yaml").read_text())
     design |= {"load_n": {"to": 5, "by": 2.5}, "variants": {}, "hardness": None}

@@ -62,6 +62,7 @@ def test_its_study_says_but_its_sensor_and_the_forces_on_its_whole_width_and_tak
     assert study.spec.frusta_counts == (18, 12) and study.values.ssim.data_range == study.spec.largest_counts == 3000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["elastic", "foundation"])
 def test_a_press_has_its_maps_and_taxels_and_is_deepest_under_the_object(pressed, model):
     result = pressed[model]

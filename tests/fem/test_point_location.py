@@ -28,6 +28,7 @@ def test_a_node_is_found_at_itself():
         assert abs(interpolation_2d(mesh, mesh.points) - np.eye(len(mesh.points))).max() < 1e-6
 
 
+@pytest.mark.slow
 @given(x=st.floats(-2.0, 2.0), y=st.floats(-1.45, 1.45), name=st.sampled_from(sorted(PLANS)))
 @settings(max_examples=50, deadline=None)
 def test_linear_fields_are_interpolated_exactly_everywhere(x, y, name):

@@ -75,6 +75,7 @@ def test_an_empty_frame_is_an_answer_and_not_an_error(folder, tmp_path, capsys):
     assert len(pd.read_csv(tmp_path / "none.csv")) == 0 and (tmp_path / "none.png").is_file()
 
 
+@pytest.mark.slow
 def test_the_frames_of_a_video_and_the_pages_of_a_stack_are_measured_one_by_one(tmp_path, capsys):
     for name, how in [
         ("clip.mp4", {"plugin": "pyav", "codec": "libx264", "fps": 10}),

@@ -48,6 +48,7 @@ def errors(diameter, *, frames=2, **camera):
     return off / area, off / np.concatenate([table.area_sd_mm2 for table in tables])
 
 
+@pytest.mark.slow
 def test_areas_at_signal_to_noise_five_and_a_third_less_light_are_as_good_as_noise_lets_them():
     for diameter in [12, 16, 24]:
         relative, _ = errors(diameter)

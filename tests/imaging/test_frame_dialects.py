@@ -84,6 +84,7 @@ DIALECTS = {
 }
 
 
+@pytest.mark.slow
 @quick
 @given(name=st.sampled_from(sorted(DIALECTS)), seed=st.integers(0, 99))
 @pytest.mark.filterwarnings("error")

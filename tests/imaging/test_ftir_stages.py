@@ -46,6 +46,7 @@ def validated_into(folder, pressed):
     return outputs
 
 
+@pytest.mark.slow
 def test_each_orientation_and_law_has_its_curve_and_no_force_is_no_contact(pressed):
     state = read_dataset(pressed["state"])
     assert state.area_per_frustum_mm2.dims == ("orientation", "law", "force")

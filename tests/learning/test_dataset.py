@@ -40,6 +40,7 @@ def test_trials_of_one_load_step_stay_on_one_side(study):
     assert not maps["validation"] & (maps["unseen"] | maps["grasps"])
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_another_one_another_split(study, tmp_path):
     first, again, other = (run_stage(study, tmp_path / name, seed=seed)["train"][0].read_bytes()
                            for name, seed in (("first", 1), ("again", 1), ("other", 2)))
@@ -188,6 +189,7 @@ def test_a_wrong_setting_is_refused_with_its_name(study):
             build(study, **changes)
 
 
+@pytest.mark.slow
 def test_the_stage_writes_splits_that_read_back_and_the_same_bytes_again(study, tmp_path):
     outputs = run_stage(study, tmp_path / "a")
     again = run_stage(study, tmp_path / "b")

@@ -97,6 +97,7 @@ def test_the_history_has_a_row_per_epoch_and_no_wall_time(finished):
     assert pd.read_csv(finished[0] / "learning/elastic/timing.csv").columns.tolist() == ["epoch", "wall_time_s"]
 
 
+@pytest.mark.slow
 def test_the_model_file_holds_the_best_epochs_weights_and_the_printed_networks_own_learning_rate(finished):
     folder = finished[0]
     network, facts = load_network(folder / "learning/elastic/model.pt")
@@ -145,6 +146,7 @@ def test_the_model_file_tells_what_maps_it_was_trained_on(finished):
     assert facts["range"]["map_max_mm"] == pytest.approx([train.maps_mm.max(axis=(1, 2)).min(), train.maps_mm.max()])
 
 
+@pytest.mark.slow
 def test_both_architectures_stand_in_one_table_and_one_figure(finished):
     folder, inputs, _ = finished
     runs = [run_training(folder, model, into=f"beside/{kind}", network={**SETTINGS["network"], "architecture": kind})

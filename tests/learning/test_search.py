@@ -87,6 +87,7 @@ def test_processes_share_a_search_and_end_with_the_same_table(tmp_path):
     pd.testing.assert_frame_equal(search_table(search(tmp_path / "search.journal")), own, check_exact=True)
 
 
+@pytest.mark.slow
 def test_the_trial_of_a_process_that_died_is_done_by_the_others(tmp_path):
     spawn = multiprocessing.get_context("spawn")
     started = spawn.Event()

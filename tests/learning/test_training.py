@@ -46,6 +46,7 @@ def same_weights(a, b):
     return all(torch.equal(tensor, b[name]) for name, tensor in a.network.state_dict().items())
 
 
+@pytest.mark.slow
 def test_it_learns_eight_maps_by_heart():
     few = make_samples(8)
     network = {"filters": (8, 8, 8), "dense": 128, "activation": "relu"}  # with less, dead neurons are a matter of luck

@@ -58,6 +58,7 @@ def test_operations_grow_with_the_cube_of_a_plates_width_and_entries_with_its_ar
     assert 7 < large[0] / small[0] < 10 and 4 < large[1] / small[1] < 5.5
 
 
+@pytest.mark.slow
 def test_triangles_and_rows_of_16_bits_hold_the_factor(workers):
     for size in [(3, 2), (30, 17), (60, 40)]:
         whole, upper, places = plate(*size)

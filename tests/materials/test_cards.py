@@ -81,6 +81,7 @@ def test_without_a_uniaxial_curve_the_card_says_why_it_has_no_modulus(curves_of)
     assert any("too few for Young's modulus; give a uniaxial curve" in sentence for sentence in card["warnings"])
 
 
+@pytest.mark.slow
 def test_the_best_law_is_the_one_that_explains_most_with_fewest_constants(curves_of):
     card = make_card(curves_of("mooney_rivlin", {"c10": 0.15, "c01": 0.03}, noise=0.01), choose="best")
     assert card["chosen"] == card["ranking"][0]
@@ -319,6 +320,7 @@ def test_silicones_are_fitted_up_to_a_strain_of_100_percent(published):
         assert entry["rmse_mpa"] < left * np.abs(curves[0].within((1.0, 2.0)).nominal_stress).max(), name
 
 
+@pytest.mark.slow
 def test_two_modes_of_natural_rubber_predict_the_third(published):
     """Two terms, measured: the planar test within 11 and 2.4 %, the equibiaxial one, stretched most, within 23 and 7.6 %."""
     for who, planar, equibiaxial in [("Treloar_1944", 0.12, 0.25), ("Kawabata_1981", 0.03, 0.1)]:

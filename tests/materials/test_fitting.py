@@ -202,6 +202,7 @@ def test_options_without_meaning_are_refused(curves_of):
             fit_law("neo_hooke", curves_of("neo_hooke", {"c10": 0.2}), **options)
 
 
+@pytest.mark.slow
 def test_curves_from_table_1_with_noise_give_back_its_constants_within_the_stated_confidence(curves_of):
     """Two standard errors hold 95 % of them; of 12 noises times 2 or 4 constants, 3 standard errors of the count fewer."""
     for material, law in TABLE_1:

@@ -163,6 +163,7 @@ def test_what_was_reached_before_an_interruption_is_kept_by_each_model(sensors, 
     assert seen[0].normal_force_n.tolist() == stopped.value.result.normal_force_n.tolist()
 
 
+@pytest.mark.slow
 def test_what_was_reached_before_a_motion_fails_is_kept_by_the_elastic_model(sensors):
     with pytest.raises(ConvergenceError) as stopped:
         sensors["frusta"].press(BALL, motion=Motion().press(depth_mm=[0.02, 2.0]), model="elastic", label="")

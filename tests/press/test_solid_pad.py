@@ -63,6 +63,7 @@ def twisted():
     return steps_of(small_sensor(), motion, friction=0.2)
 
 
+@pytest.mark.slow
 def test_a_twist_that_slides_needs_the_torque_of_coulombs_law(twisted):
     """Expected: the integral of mu p r over the contact, of which 20 degrees slide all but the innermost points."""
     _, body, steps = twisted

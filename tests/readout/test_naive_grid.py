@@ -15,6 +15,7 @@ NINE = CORO.model_copy(update={"footprint_mm": (16.5, 15.9), "taxels": CORO.taxe
 COARSE = Fineness(side=7, between=2, frusta=3, sheet=2, outwards=6)
 
 
+@pytest.mark.slow
 def test_a_lone_square_electrode_has_the_capacitance_of_the_method_of_moments():
     """In air, 5 mm wide, 1 mm apart: 1.545 times plates without edges. Elements end 6 mm away and leave the edges' singularity."""
     air = CORO.dielectric.model_copy(update={"relative_permittivity": 1.0 + 1e-9})
@@ -31,6 +32,7 @@ def test_charges_are_reciprocal_and_add_up_to_those_of_all_driven_together():
     np.testing.assert_allclose(field.maxwell.sum(axis=1).reshape(2, 2), field.driven_together, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_an_electrode_among_neighbours_has_the_area_of_its_whole_taxel():
     """Neighbours at the same potential guard it, and the 0.3 mm between two are closer than the gap; 0.3 % less measured."""
     inner = GridField(NINE, np.zeros(NINE.map_shape), fineness=COARSE).driven_together[1, 1]
@@ -39,6 +41,7 @@ def test_an_electrode_among_neighbours_has_the_area_of_its_whole_taxel():
     assert np.prod(electrode_sides(NINE, spacing_mm=0.3)) < 0.9 * 5.5 * 5.3      # so its own area does not explain it
 
 
+@pytest.mark.slow
 def test_a_uniform_press_is_read_inside_as_the_gap_formula_says():
     """At the border field lines go around the fabric, which changes less with the gap: 6 and 11 % less, measured."""
     down = np.full(NINE.map_shape, 0.1)

@@ -168,6 +168,7 @@ def scored(folder):
     return inputs
 
 
+@pytest.mark.slow
 def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     folder = tmp_path / "results"
     names = ("table1", "contradictions", "table2", "table3", "policies", "networks", "claims", "summary")

@@ -101,6 +101,7 @@ def test_a_file_pressed_again_is_the_same_file(sensor, stud, record, maps, tmp_p
     assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_shear_of_an_event_is_pressed_where_it_is_asked_for(record):
     pad, ball = softtact.load_sensor("pad4x4"), trimesh.creation.icosphere(3, radius=4.0)
     forces, poses = record.force_n.copy(), record.object_pose_sensor.copy()

@@ -64,6 +64,7 @@ def test_a_robot_of_ones_own_takes_the_place_of_the_built_one(folder, coro):
     assert abs(own.force_n - built.force_n).max() < 0.05 and (own.event_row == built.event_row).all()
 
 
+@pytest.mark.slow
 def test_where_mujoco_does_not_draw_a_sentence_says_so_and_the_maps_are_drawn(folder):
     line = [sys.executable, "-m", "softtact", *f"{GRASP} --no-lift --video --out blind".split()]
     done = subprocess.run(line, capture_output=True, text=True, env=os.environ | {"MUJOCO_GL": "wrong"}, check=False)

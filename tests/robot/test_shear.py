@@ -39,6 +39,7 @@ def test_the_way_is_found_in_a_few_presses(sensor, ball, monkeypatch):
     assert len(presses) <= 3      # a probe, a step of Newton's method, and one that mends what has slid
 
 
+@pytest.mark.slow
 def test_the_opposite_shear_is_felt_mirrored(sensor, ball):
     one, other = (press_with_shear(sensor, ball, None, force_n=1.0, shear_n=np.array([sign * 0.3, 0.0]), threads=1).result
                   for sign in (1, -1))

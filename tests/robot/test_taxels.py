@@ -35,6 +35,7 @@ def errors(sensor, mesh, model, count):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_elastic_readings_are_those_of_a_press_at_the_very_place_and_force():
     """Measured: 2.1 % in the mean and 3.3 % at most, where 2 % is what the contact's nodes, 0.34 mm apart, leave of any press."""
     found = errors(load_sensor("coro"), CYLINDER, "elastic", 16)

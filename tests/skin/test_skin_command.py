@@ -28,6 +28,7 @@ def written(folder, **changes):
     return path
 
 
+@pytest.mark.slow
 def test_a_design_becomes_readings_figures_exports_and_a_report(tmp_path, capsys):
     Image.fromarray(np.pad(np.zeros((20, 10), dtype=np.uint8), 5, constant_values=255)).save(tmp_path / "print.png")
     loads = [*SMALL["loads"], {"name": "ink", "mask": "print.png", "pixel_mm": 0.2, "at_mm": [15, 9], "pressure_kpa": 10}]
@@ -45,6 +46,7 @@ def test_a_design_becomes_readings_figures_exports_and_a_report(tmp_path, capsys
     assert (tmp_path / "out/exports/skin.txt").read_text().count("\n") == 16
 
 
+@pytest.mark.slow
 def test_an_object_presses_at_finite_strains_where_the_design_says_so(tmp_path, capsys):
     trimesh.creation.icosphere(subdivisions=4, radius=8.0).export(tmp_path / "ball.stl")
     ball = {"mesh": "ball.stl", "at_taxel": 7, "force_n": 0.1}

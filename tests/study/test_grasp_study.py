@@ -47,6 +47,7 @@ def results(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_study_leaves_grasps_readings_claims_figures_and_a_report(results):
     out = results / "out"
     table = pd.read_csv(out / "grasps.csv")

@@ -74,6 +74,7 @@ def boussinesq_press(cells):
     return load_step.indentation, np.sqrt((load_step.nodal_force > 0).sum() * h * h / np.pi)
 
 
+@pytest.mark.slow
 def test_a_sphere_on_a_block_of_tetrahedra_indents_as_hertz_says(tetrahedral_blocks, record):
     expected, source = DEPTH, HERTZ
     small, large = (tetrahedral_depth(block, paraboloid(RADIUS)) for block in tetrahedral_blocks)
@@ -139,6 +140,7 @@ def elastic_depth(far):
     return load_step.indentation
 
 
+@pytest.mark.slow
 def test_a_sphere_on_the_elastic_models_block_indents_as_hertz_says(record):
     expected, source = DEPTH, HERTZ
     small, large = elastic_depth(4.0), elastic_depth(8.0)
@@ -183,6 +185,7 @@ def test_a_sphere_on_the_slab_needs_hertzs_force(record):
         assert error < 0.015
 
 
+@pytest.mark.slow
 def test_the_slabs_contact_radius_and_pressure_are_hertzs(record):
     """At the force that the block carries; pressures are means over element faces, for the penalty's own points ripple."""
     block = block_of(uniform(linear_law(YOUNG)), cells=4, far=12.0, growing=4)
@@ -197,6 +200,7 @@ def test_the_slabs_contact_radius_and_pressure_are_hertzs(record):
     assert record("slab, sphere: contact radius", expected=a, source=HERTZ, got=got) < 0.05      # a point every a/12
 
 
+@pytest.mark.slow
 def test_a_flat_punch_on_the_slab_follows_the_closed_form_and_better_on_a_finer_grid(record):
     source, errors = PUNCH, []
     for cells in (2, 4):
@@ -264,6 +268,7 @@ def test_a_wide_smooth_punch_on_a_thin_layer_compresses_it_as_if_confined(record
     assert error < 5e-3
 
 
+@pytest.mark.slow
 def test_slab_and_tetrahedra_agree_on_the_same_layer_at_small_load(record):
     """One box of one material, base and sides held, no frusta: the slab's hexahedra against linear tetrahedra."""
     young, poisson, surface, depth = 1.289, 0.1729, paraboloid(1000.0), 2e-3

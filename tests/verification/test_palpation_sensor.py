@@ -80,6 +80,7 @@ def test_a_thin_tissue_between_rigid_faces_is_a_bonded_strip():
 OTHERS_MESH = {"along": 2.5, "tissue": 2.5, "base": 2.5, "edge": None}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tissue, line, at_rest", [("ecoflex_00_30", 51.1, 48.9), ("dragon_skin_20", 67.6, 53.1)])
 def test_another_programs_slopes_are_ours_within_half_a_per_cent(tissue, line, at_rest):
     """Where rubber is linear, and to 3 mm, which the hard rubber takes 27 % stiffer."""

@@ -30,6 +30,7 @@ def test_the_papers_study_is_planned_whole(fresh):
     assert {job["model"] for job in plan["train_cnn"]} == {"elastic", "hyperelastic"}
 
 
+@pytest.mark.slow
 def test_a_tested_foundation_model_asks_for_its_frustum_law_first(fresh):
     plan = Project(fresh.folder).plan("--config", "tested=[foundation,hyperelastic]")
     assert plan["frustum_law"] == [{"model": "foundation"}]
@@ -37,6 +38,7 @@ def test_a_tested_foundation_model_asks_for_its_frustum_law_first(fresh):
         assert "foundation" in {job["model"] for job in plan[rule]}
 
 
+@pytest.mark.slow
 def test_a_study_without_a_learning_curve_and_repeated_seeds_plans_neither(fresh):
     plan = Project(fresh.folder).plan("--config", "learning={seeds: 1}", "learning_curve={shares: []}")
     assert not {"learning_curve", "find_limits", "draw_fig10_learning_curve", "repeat_learning", "gather_seeds"} & set(plan)
@@ -48,11 +50,13 @@ def test_a_misspelt_key_is_answered_with_the_nearest_right_one(fresh):
     assert "softtact: the configuration: there is no key 'forces_nn'; did you mean 'forces_n'?" in said
 
 
+@pytest.mark.slow
 def test_an_unknown_material_is_refused(fresh):
     said = refusal(fresh, "--config", "materials=[polyurethane,neoprene,neopren]")
     assert "there is no material 'neopren' (did you mean 'neoprene'?); known are neoprene, polyurethane, silicone" in said
 
 
+@pytest.mark.slow
 def test_a_mesh_that_is_not_there_is_refused(fresh, tmp_path):
     project = Project.of_sources(tmp_path)
     (project.folder / "config/objects/indenters/square.stl").unlink()

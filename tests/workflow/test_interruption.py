@@ -85,6 +85,7 @@ def test_results_that_cannot_be_written_are_reported_in_one_sentence(tmp_path):
     assert "results/tiny: cannot be written to" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_second_run_beside_a_running_one_is_refused(tmp_path):
     project = Project.of_sources(tmp_path)
     run = project.start(environment=SLOW_PRESSES)

@@ -20,6 +20,7 @@ def project(tmp_path):
     return made
 
 
+@pytest.mark.slow
 def test_items_are_pressed_and_recordings_stand_for_the_virtual_sensor(project):
     plan = project.plan()
     assert {f"{job['set']}/{job['item']}" for job in plan["read_recordings"]} == set(ITEMS)

@@ -56,6 +56,7 @@ def points_of(name, compliance):
     return Underside(HeightField(placed(name)), compliance.grid).nodes(SMALL.thickness_mm)
 
 
+@pytest.mark.slow
 def test_a_press_is_that_of_the_whole_layer_on_the_same_mesh(compliance, whole):
     for name in OBJECTS:
         points = points_of(name, compliance)

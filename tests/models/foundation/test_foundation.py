@@ -53,6 +53,7 @@ def test_maps_and_compressions_are_those_of_the_whole_slab(loaded, whole):
     assert_close((places.surface() @ load + lateral @ places.lateral())[-36:], -(whole.descents @ moved), 1e-5)
 
 
+@pytest.mark.slow
 def test_movements_sideways_are_those_of_the_whole_slab(loaded, whole, compliance):
     places, load, _, _, moved = loaded
     coarse = compliance.grid.every_second

@@ -38,6 +38,7 @@ def family(specimen):
     return cell_family(CORO, LAW, specimen, largest_n=60.0, mesh=COARSE)
 
 
+@pytest.mark.slow
 def test_the_contact_area_starts_as_the_tip_and_grows_without_jumps():
     """Up to the paper's 140 N on 540 frusta. A side that snaps onto the glass at once would add 0.05 mm2 from step to step.
 

@@ -29,6 +29,7 @@ def test_an_edge_is_felt_where_it_is_wherever_it_crosses_an_element(half_width):
     assert np.abs(difference).max() < 0.015 * largest
 
 
+@pytest.mark.slow
 def test_the_indentation_falls_evenly_as_a_punch_gets_wider():
     """Without soft edges it stayed for half an element and then fell by a tenth."""
     indentation = np.array([pressed(COARSE, half).indentation_mm[0] for half in np.linspace(1.24, 1.48, 7)])

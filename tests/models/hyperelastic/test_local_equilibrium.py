@@ -106,6 +106,7 @@ def test_a_cell_whose_frustum_moved_alone_gets_a_new_tangent(body):
     assert body.cells.refresh(body.balanced(state, TOLERANCE_N), kept_mm=1.0) == 1
 
 
+@pytest.mark.slow
 def test_a_press_takes_fewer_steps_of_the_whole_sensor_and_gives_the_same_map(monkeypatch):
     """Frusta of two rings beside a punch rock on their tips."""
     sensor = Sensor(CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)}), {"dielectric": LAW, "cover": LAW},

@@ -85,6 +85,7 @@ def test_a_spike_between_the_contact_points_goes_down_until_they_touch_it():
     assert not result.within_validity.any()     # a handful of points does not resolve it
 
 
+@pytest.mark.slow
 def test_a_tip_deeper_than_the_sensor_is_thick_is_no_load_step_and_the_load_steps_before_are_kept(monkeypatch):
     tip = press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS).indentation_mm
     monkeypatch.setattr(SensorSpec, "thickness_mm", tip.mean())

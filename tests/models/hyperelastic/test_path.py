@@ -39,6 +39,7 @@ def slid():
     return sensor(MU).press(ball(), motion=motion, model="hyperelastic", label="")
 
 
+@pytest.mark.slow
 def test_a_ball_sinks_as_deep_by_force_as_the_depth_that_gave_that_force():
     """One curve of force and depth, walked by either control. The light press is settled to 1e-5 of its force, so 1e-4 is ample."""
     fine = replace(TIGHT, relative_tolerance=5e-8, first_touch_tolerance_n=1e-6)
@@ -54,6 +55,7 @@ def test_the_vector_of_force_holds_the_normal_force_and_a_ball_in_the_middle_giv
     assert np.abs(slid.torque_nmm[:2]).max() < 1e-3 * 0.25 * 0.3      # of the force times the contact's radius
 
 
+@pytest.mark.slow
 def test_a_plate_that_slides_is_held_by_the_coefficient_times_the_force():
     """Coulomb: |T| = mu N once all points slide; the cover of a plate without slope has no other force along x."""
     plate = trimesh.creation.box((2.6, 2.6, 1.0))
@@ -91,6 +93,7 @@ def test_the_end_depends_on_the_path_with_friction_and_not_without():
     assert np.abs(end(0.0, -0.3) - straight[0.0]).max() < 2e-4      # facets under other points, 0.1 um of overlap
 
 
+@pytest.mark.slow
 def test_a_mirrored_motion_gives_mirrored_maps():
     right, left = (sensor(MU).press(ball(), motion=Motion().press(depth_mm=0.1).slide(x_mm=way, steps=2), model="hyperelastic",
                                     label="") for way in (0.2, -0.2))

@@ -73,6 +73,7 @@ def test_a_wide_plate_on_a_bonded_layer_finds_the_confined_modulus(thicknesses, 
     assert np.ptp(top) < 0.01 * top.mean()      # a plate, and nothing that differs from place to place
 
 
+@pytest.mark.slow
 def test_the_elastic_and_the_hyperelastic_model_agree_under_a_light_ball():
     """Same E and nu, 3 % of the thickness deep: 2 % of depth and map, for meshes (1 %) and stiffening (1 %)."""
     of = spec(2.0, side_mm=9.0, points=31, element_mm=0.5)
