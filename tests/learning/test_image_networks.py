@@ -6,7 +6,6 @@ import torch
 
 from softtact.errors import InputError
 from softtact.learning.image_networks import (
-    NETWORKS,
     ImageGenerator,
     PatchDiscriminator,
     adversarial_loss,
@@ -16,6 +15,7 @@ from softtact.learning.image_networks import (
     patch_score,
     save_generator,
 )
+from softtact.learning.image_settings import NETWORKS
 
 
 def _small(**options):

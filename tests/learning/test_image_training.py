@@ -7,8 +7,8 @@ import torch
 from softtact.errors import ConvergenceError, InputError
 from softtact.learning.image_data import ImageSequences, from_network, open_sequences, to_network
 from softtact.learning.image_networks import ImageGenerator, PatchDiscriminator, adversarial_loss, make_networks
+from softtact.learning.image_settings import ImageTraining
 from softtact.learning.image_training import (
-    ImageTraining,
     check_memory,
     generate,
     rate_at,

@@ -1,10 +1,11 @@
 """Networks from a sequence of depth images to a sequence of camera images with markers, as printed by Kim et al. (2023).
 
-`ImageGenerator`: a UNet of 3-D convolutions whose bottom, one pixel a frame, goes through two LSTM layers. `PatchDiscriminator`:
-PatchGAN with 3-D convolutions. The paper states inputs, outputs, channels and the number of weights, 58.6 and 2.8 million, but no
-kernel. They follow from these numbers: UNet and PatchGAN of Pix2Pix (kernels 4 x 4, stride 2) have 54.4 and 2.8 million, and two
-LSTM layers of 512 add 4.2. A kernel of three frames would give 163 million. So the printed kernels are 1 x 4 x 4: only the LSTM
-sees other frames, and the printed "3D-UNet", which has none, treats each frame alone. `temporal=3` is the true 3-D kernel.
+`ImageGenerator`: a UNet of 3-D convolutions whose bottom, one pixel a frame, goes through two LSTM layers of 512. It takes and
+makes (n, 256, 256, 3) and has 58.6 million weights. `PatchDiscriminator`: PatchGAN of 3-D convolutions, (n, 256, 256, 6) to
+(n, 30, 30, 1), with 2.8 million weights. The paper prints no kernel. These numbers are those of Pix2Pix, on which the networks are
+based, with kernels of 4 x 4 pixels and of one frame: its UNet and PatchGAN have 54.4 and 2.8 million weights, and the LSTM layers
+4.2. Kernels of three frames have 163 million. So only the LSTM sees other frames, and the printed "3D-UNet" without it treats each
+frame alone. `temporal=3` is the true 3-D kernel, of a frame and the two before it.
 
 Not printed, and as in Pix2Pix: batch normalisation, dropout of the three layers above the bottom, slopes, the non-saturating loss.
 Images are float, -1 to 1, shape (sequence, frame, y, x, channel); inside, torch's (sequence, channel, frame, y, x).
@@ -20,6 +21,7 @@ from torch.nn import functional
 
 import softtact
 from softtact.errors import InputError
+from softtact.learning.image_settings import NETWORKS
 from softtact.learning.network import load, save
 
 PRINTED_CHANNELS = (64, 128, 256, 512, 512, 512, 512, 512)
@@ -146,15 +148,6 @@ def adversarial_loss(logits: torch.Tensor, *, real: bool) -> torch.Tensor:
 def count_weights(network: nn.Module) -> int:
     """Number of trained weights."""
     return sum(parameter.numel() for parameter in network.parameters())
-
-
-NETWORKS = {
-    "proposed": {"lstm_layers": 2, "temporal": 1},
-    "no_lstm": {"lstm_layers": 0, "temporal": 1},
-    "pix2pix": {"lstm_layers": 0, "temporal": 1},
-    "temporal": {"lstm_layers": 0, "temporal": 3},
-}
-"""Options of the compared networks. Pix2Pix is trained on frames in random order, the others on sequences."""
 
 
 def make_networks(name: str, *, size: str = "reduced", dropout: float | None = None) -> tuple[ImageGenerator, PatchDiscriminator]:

@@ -16,34 +16,20 @@ from typing import Any
 
 import numpy as np
 import torch
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 from torch import nn
 
 from softtact.errors import ConvergenceError, InputError
 from softtact.files import digest
 from softtact.learning.image_data import ImageSequences, from_network, to_network
 from softtact.learning.image_networks import ImageGenerator, PatchDiscriminator, adversarial_loss, count_weights
+from softtact.learning.image_settings import ImageTraining
 from softtact.learning.network import load, save
-from softtact.learning.settings import Settings
 from softtact.progress import Watch
 
 # Measured: 0.20 GB of the reduced networks with 26 frames, 0.59 GB with 208, 1.52 GB of the printed ones with 2.
 _BYTES_PER_WEIGHT = 20      # weight, gradient, two moments in float32, and what the optimiser needs for a while
 _KEPT_COPIES = 2.5          # of each layer's output until the gradients are known
 _ALWAYS_GB = 0.1
-
-
-class ImageTraining(Settings):
-    """How a generator is trained; the defaults are printed ones."""
-
-    epochs: PositiveInt = 20
-    constant_epochs: PositiveInt = Field(10, description="with the first rate; then it falls linearly to 0")
-    learning_rate: PositiveFloat = 2e-4
-    momenta: tuple[NonNegativeFloat, NonNegativeFloat] = Field((0.5, 0.999), description="of Adam")
-    l1_weight: NonNegativeFloat = Field(100.0, description="of the mean absolute error of pixels beside the adversarial loss")
-    shuffle_frames: bool = Field(False, description="steps take frames of all sequences in random order: Pix2Pix")
-    frames: PositiveInt = Field(26, description="of a step with shuffled frames")
-    checkpoint_every_s: PositiveFloat = 300.0
 
 
 @dataclass

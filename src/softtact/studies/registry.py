@@ -46,6 +46,8 @@ KINDS = {
                    "softtact.studies.grasps.jobs:jobs"),
     "decide": Kind("softtact.studies.decide.config:read_values", "softtact.studies.decide.config:load_study",
                    "softtact.studies.decide.jobs:jobs"),
+    "markers": Kind("softtact.studies.markers.config:read_values", "softtact.studies.markers.config:load_study",
+                    "softtact.studies.markers.jobs:jobs"),
 }
 
 

@@ -1,0 +1,131 @@
+"""Tables, claims and the page."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+from softtact.files import read_json, write_csv
+from softtact.reporting.page import Page
+from softtact.studies.markers.claims import PRINTED_IMAGES, PRINTED_MARKERS, WORDS, claims_of_markers
+from softtact.studies.markers.judging import by_motion, by_object, sliding_verdicts
+from softtact.studies.markers.scoring import table_one, table_two
+
+CAPTIONS = {
+    "fig7_examples": "Figure 7: depth image, solved image, and the images of each network, of objects that no network knew; "
+    "pressed down, then aside.",
+    "fig8_d": "Figure 8: d, the sum over all markers of their position error in px of the camera; in the mean of test sequences.",
+    "fig9_mse": "Figure 9: mean squared error outside the markers.",
+    "fig10_sliding": "Figure 10: change of the summed motion of the markers (equation 8) while the sensor moves aside.",
+    "training": "Losses of the trainings, one line a seed.",
+}
+_TITLES = {"by_object": "By object", "sliding": "Sliding test", "manifest": "Sequences"}
+_MOST_ROWS = 40
+
+
+def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the tables and the claims.
+
+    inputs: scores (list of CSV), sliding (CSV), facts (JSON)
+    outputs: scores, table1, table2, by_object, by_motion, sliding, claims (CSV)
+    settings: sources (in their order), trained (objects), networks
+    """
+    rows = pd.concat([pd.read_csv(file) for file in inputs["scores"]], ignore_index=True)
+    verdicts = sliding_verdicts(pd.read_csv(inputs["sliding"]), settings["trained"])
+    write_csv(outputs["scores"], rows)
+    write_csv(
+        outputs["table1"], _beside(table_one(rows, settings["sources"]), PRINTED_MARKERS, ("d_px", "e_px", "degenerate_percent"))
+    )
+    write_csv(outputs["table2"], _beside(table_two(rows, settings["sources"]), PRINTED_IMAGES, ("mae", "mse", "ssim", "psnr")))
+    write_csv(outputs["by_object"], by_object(rows))
+    write_csv(outputs["by_motion"], by_motion(rows))
+    write_csv(outputs["sliding"], verdicts)
+    write_csv(outputs["claims"], claims_of_markers(rows, verdicts, read_json(inputs["facts"]), _weights(settings["networks"])))
+
+
+def _weights(names: Sequence[str]) -> dict[str, int]:
+    """Numbers of weights of the compared networks, and of the printed ones."""
+    import torch
+
+    from softtact.learning.image_networks import count_weights, make_networks
+
+    with torch.device("meta"):  # sizes without numbers
+        found = {name: count_weights(make_networks(name)[0]) for name in names}
+        return found | {
+            f"{name}_printed": count_weights(make_networks(name, size="printed")[0]) for name in ("proposed", "temporal")
+        }
+
+
+def _beside(table: pd.DataFrame, printed: dict[str, tuple[float, ...]], names: tuple[str, ...]) -> pd.DataFrame:
+    """A table with the printed numbers of the same columns beside, and rows of those sources that are only printed."""
+    known = pd.DataFrame(
+        [
+            {"source": source, **{f"printed_{name}": value for name, value in zip(names, values, strict=True)}}
+            for source, values in printed.items()
+        ]
+    )
+    return table.merge(known, on="source", how="outer", sort=False)
+
+
+def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the page.
+
+    inputs: table1, table2, by_object, sliding, claims, manifest (CSV), facts (JSON), figures (list), drag (HTML)
+    outputs: page;  settings: study, size, pixels, friction (words), config
+    """
+    tables = {
+        name: pd.read_csv(inputs[name], keep_default_na=name != "claims")
+        for name in ("table1", "table2", "by_object", "sliding", "claims", "manifest")
+    }
+    facts = read_json(inputs["facts"])
+    page = Page("Marker images", settings["study"], folder=outputs["page"].parent)
+    page.box(
+        "What is synthetic here.",
+        "No real image of this sensor is here. The images that networks learn from, and are scored on, "
+        "are our own: solved by the elastic model and drawn by the camera readout. A network can only come near that physics, "
+        "and no number here is the paper's. How far the physics itself is from real markers is told by `softtact stage "
+        "markers.compare_markers`, for anyone who has an image.",
+    )
+    for sentence in _facts(facts, settings):
+        page.text(sentence)
+    page.section("Tables I and II")
+    page.text(
+        "Means over the scored frames; _sd: standard deviation over trainings from several seeds. d and e are of images in which "
+        "every marker was found. `physics`: the solved images, their markers found by the same detector, which is the floor of "
+        "all d. printed: the paper's, on its real images."
+    )
+    for name, title in (
+        ("table1", "Table I: markers"),
+        ("table2", f"Table II: outside the markers, images of {settings['pixels']} px"),
+    ):
+        page.table(_worded(tables[name]), title, file=inputs[name])
+    page.section("Drag through a sequence", anchor="drag")
+    page.figure(inputs["drag"], "Drag the slider, or in the picture. Yellow: motion of the markers since rest, five times.")
+    page.figures((path, CAPTIONS[path.stem]) for path in inputs["figures"])
+    page.claims(tables["claims"], file=inputs["claims"])
+    page.section("More tables")
+    for name, title in _TITLES.items():
+        page.table(_worded(tables[name]).head(_MOST_ROWS), title, file=inputs[name])
+    page.section("Configuration")
+    page.code(settings["config"])
+    page.write(outputs["page"])
+
+
+def _worded(table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(source=table.source.map(lambda name: WORDS.get(name, name))) if "source" in table else table
+
+
+def _facts(facts: dict[str, Any], settings: dict[str, Any]) -> list[str]:
+    made = facts["generated"]
+    objects = (
+        "All objects are generated after the sizes of the paper's files."
+        if len(made) >= 16
+        else f"Generated, the others being the authors' files: {', '.join(made)}."
+    )
+    return [
+        f"{facts['sequences']} sequences of {facts['frames']:,} frames were pressed, {facts['share_of_printed_pairs']:.1%} of the "
+        f"paper's 317,520 pairs; networks are {settings['size']}, images {settings['pixels']} px. The largest force is "
+        f"{facts['largest_force_n']:.3g} N, the largest motion of a marker {facts['largest_marker_motion_px']:.3g} px of the "
+        "camera's image.",
+        objects,
+    ]
