@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_v
 
 from softtact.errors import InputError
 from softtact.learning.image_settings import NETWORKS, ImageTraining
+from softtact.readout.camera import camera_of
 from softtact.sensors.fields import plain_value
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
@@ -96,15 +97,11 @@ class MarkerValues(Section):
     objects: Objects
     path: PathKeys
     share: ShareKeys
-    thickness_mm: Annotated[PositiveFloat, BeforeValidator(plain_value)] = Field(description="depth that grey 255 stands for")
     poses_per_file: PositiveInt = Field(9, description="of an object; a job presses one file")
     surface_maps: bool = Field(False, description="whether files also hold displacement and traction of the surface")
     networks: NetworkKeys
     baselines: list[Literal["full_stick", "linear_frictionless"]] = Field([], description="other physics, pressed for the tests")
     scored_every: PositiveInt = Field(description="frames, from each test sequence's last one back")
-    marker_radius_px: Annotated[PositiveFloat, BeforeValidator(plain_value)] = Field(
-        description="in px of the camera; left out around markers by image scores, with a margin of a half"
-    )
     sliding: SlidingKeys
     shown: _Count = Field(3, description="sequences on the page that one drags through")
 
@@ -159,6 +156,17 @@ class MarkerStudy:
         """Side in px of the images that networks take."""
         return 256 if self.values.networks.size == "printed" else 64
 
+    @property
+    def marker_radius_px(self) -> float:
+        """Of the sensor's camera, in px of its image."""
+        camera = camera_of(self.spec, "camera")
+        return camera.markers.radius_mm / camera.pinhole.mm_per_px  # type: ignore[union-attr]
+
+    @property
+    def deepest_mm(self) -> float:
+        """Depth that grey 255 stands for: the depth readout's largest."""
+        return float((self.spec.readouts["depth"].model_extra or {})["max_mm"])
+
     def mesh_file(self, name: str) -> Path | None:
         """The file of an object, or None where it is generated."""
         if not self.values.meshes:
@@ -180,12 +188,14 @@ def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> Mar
     where = str(path or "the configuration")
     checked = validated(MarkerValues, read_mapping(DEFAULT) | dict(values), where=where)
     spec = read_spec(found_sensor(checked))
-    missing = [name for name in ("camera", "markers", "depth") if name not in getattr(spec, "readouts", {})]
+    missing = [name for name in ("camera", "markers", "depth") if name not in spec.stated_readouts]
     if missing:
         raise InputError(
             f"{where}, at 'sensor': {spec.name} has no readout {missing[0]!r}; name a sensor with the readouts camera, "
             "markers and depth, for example gelsight_wonkdim."
         )
+    if camera_of(spec, "camera").markers == "none":
+        raise InputError(f"{where}, at 'sensor': the camera of {spec.name} sees no markers; add them to its readout camera.")
     return MarkerStudy(checked, spec)
 
 

@@ -84,7 +84,7 @@ class _Jobs:
             "numbers": [number for number, _ in plans],
             "path": values.path.model_dump(mode="json"),
             "pixels": self.study.pixels,
-            "thickness_mm": values.thickness_mm,
+            "deepest_mm": self.study.deepest_mm,
             "friction": values.friction,
             "surface_maps": values.surface_maps,
             **more,
@@ -172,7 +172,7 @@ class _Jobs:
     def scoring(self) -> list[Job]:
         """Scores of networks and of what needs none, and the sliding test."""
         values, folder, grid = self.values, self.folder, self.values.grid
-        common = {"every": values.scored_every, "marker_radius_px": values.marker_radius_px}
+        common = {"every": values.scored_every, "marker_radius_px": self.study.marker_radius_px}
         frames = {"scored": sum(len(plan.moved_mm(grid)) for _, plans in self.parts for _, plan in _tests(plans))}
         networks = [
             Job(
@@ -185,8 +185,8 @@ class _Jobs:
             )
             for name, seed in self.trainings
         ]
-        others = {
-            name: [f"{folder}/baselines/{name}/{part}.nc" for part, plans in self.parts if _tests(plans)]
+        others: dict[str, list[str]] = {
+            str(name): [f"{folder}/baselines/{name}/{part}.nc" for part, plans in self.parts if _tests(plans)]
             for name in values.baselines
         }
         references = Job(
@@ -204,7 +204,7 @@ class _Jobs:
                 "generators": [self.generator(name, 0) for name in first],
             },
             {"table": f"{folder}/scores/sliding.csv"},
-            {"networks": first, "marker_radius_px": values.marker_radius_px},
+            {"networks": first, "marker_radius_px": self.study.marker_radius_px},
             work={"scored": len(self.study.objects) * 2 * 21 * (1 + len(first))},
         )
         return [*networks, references, sliding]
@@ -222,7 +222,7 @@ class _Jobs:
         )
         first, tested = list(values.networks.names), self._tested()
         generators = [self.generator(name, 0) for name in first]
-        shown = {"marker_radius_px": values.marker_radius_px, "shown": values.shown}
+        shown = {"marker_radius_px": self.study.marker_radius_px, "shown": values.shown}
         errors = {"sources": self.sources, "trained": list(values.objects.train)}
         drawn = {
             "fig7_examples": Job(

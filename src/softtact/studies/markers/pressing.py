@@ -3,7 +3,7 @@
 A file (NetCDF) has the dimension `frame`; the labels of each frame are `sequence`, `split`, `object`, `pose_x_mm`, `pose_y_mm`,
 `pose_angle_deg`, `aside`, `end_depth_mm`, `depth_mm`, `aside_mm`; its values are
 
-    depth_grey (frame, row, column)              object's depth below the surface at rest, 255 for the gel's thickness
+    depth_grey (frame, row, column)              object's depth below the surface at rest, 255 for the depth readout's largest
     image (frame, row, column, channel)          camera image, reduced by means over blocks of pixels
     marker_px (frame, marker, axis)              column and row in px of the camera's own image, not of the reduced one
     marker_mm (frame, marker, direction)         place on the surface in mm
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.readout.depth import grey
 from softtact.studies.markers.paths import Path, SequencePlan, pose_on_sensor
 
 if TYPE_CHECKING:
@@ -116,19 +117,19 @@ def sequence_file(
     *,
     path: Path,
     pixels: int,
-    thickness_mm: float,
+    deepest_mm: float,
     surface_maps: bool = False,
 ) -> "xarray.Dataset":
     """The data set of some sequences, numbered for the whole study.
 
-    make: the frames of a plan;  thickness_mm: depth that grey 255 stands for
+    make: the frames of a plan;  deepest_mm: depth that grey 255 stands for
     """
     import xarray
 
     parts: dict[str, list[np.ndarray]] = {}
     for plan, number in zip(plans, numbers, strict=True):
         frames = make(plan)
-        for name, values in (_labels(plan, number, path) | _values(frames, pixels, thickness_mm, surface_maps)).items():
+        for name, values in (_labels(plan, number, path) | _values(frames, pixels, deepest_mm, surface_maps)).items():
             parts.setdefault(name, []).append(values)
     joined = {name: np.concatenate(values) for name, values in parts.items()}
     data = xarray.Dataset({name: (_DIMENSIONS.get(name, ("frame",)), values, _attributes(name)) for name, values in joined.items()})
@@ -136,7 +137,7 @@ def sequence_file(
         data = data.assign_coords(x=("x", frames.x_mm, {"units": "mm"}), y=("y", frames.y_mm, {"units": "mm"}))
     for name in set(_DIMENSIONS) & set(joined):
         data[name].encoding = {"zlib": True, "complevel": 4}
-    return data.assign_attrs(thickness_mm=thickness_mm, camera_px=frames.image.shape[1])
+    return data.assign_attrs(deepest_mm=deepest_mm, camera_px=frames.image.shape[1])
 
 
 _DIMENSIONS = {
@@ -173,10 +174,10 @@ def _labels(plan: SequencePlan, number: int, path: Path) -> dict[str, np.ndarray
     return repeated | {"depth_mm": moved[:, 0], "aside_mm": moved[:, 1]}
 
 
-def _values(frames: Frames, pixels: int, thickness_mm: float, surface_maps: bool) -> dict[str, np.ndarray]:
+def _values(frames: Frames, pixels: int, deepest_mm: float, surface_maps: bool) -> dict[str, np.ndarray]:
     touching = frames.traction_mpa[..., 2] < 0
     found = {
-        "depth_grey": grey_of(reduced(frames.depth_mm, pixels), thickness_mm),
+        "depth_grey": grey(reduced(frames.depth_mm, pixels), max_mm=deepest_mm),
         "image": np.round(reduced(frames.image, pixels)).astype(np.uint8),
         "marker_px": frames.marker_px.astype(np.float32),
         "marker_mm": frames.marker_mm.astype(np.float32),
@@ -187,11 +188,6 @@ def _values(frames: Frames, pixels: int, thickness_mm: float, surface_maps: bool
         found |= {name: getattr(frames, name).astype(np.float32) for name in ("displacement_mm", "traction_mpa")}
         found["slip"] = frames.slip.astype(np.int8)
     return found
-
-
-def grey_of(depth_mm: np.ndarray, thickness_mm: float) -> np.ndarray:
-    """Grey levels uint8 of depths in mm: 0 at the surface at rest, 255 at the gel's bottom."""
-    return np.round(255 * np.clip(depth_mm / thickness_mm, 0, 1)).astype(np.uint8)
 
 
 def reduced(images: np.ndarray, pixels: int) -> np.ndarray:

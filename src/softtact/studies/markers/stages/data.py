@@ -37,7 +37,7 @@ def press_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
     """Press an object along some sequences, and write what camera, markers and depth readout give.
 
     inputs: mesh, sensor, materials;  outputs: sequences (NetCDF of `pressing`)
-    settings: plans (values of `paths.SequencePlan`), numbers, path, pixels, thickness_mm, friction, surface_maps
+    settings: plans (values of `paths.SequencePlan`), numbers, path, pixels, deepest_mm, friction, surface_maps
     """
     press = _Press(inputs, settings)
     data = sequence_file(
@@ -46,7 +46,7 @@ def press_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
         press,
         path=press.path,
         pixels=settings["pixels"],
-        thickness_mm=settings["thickness_mm"],
+        deepest_mm=settings["deepest_mm"],
         surface_maps=settings["surface_maps"],
     )
     write_dataset(outputs["sequences"], data, seed=None, settings=settings)

@@ -58,7 +58,9 @@ def draw_examples(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
         )
         axes[1, k].imshow(data.image.values[at])
         for place, name in zip(axes[2:, k], generators, strict=True):
-            place.imshow(made[name].images[frame])
+            images = made[name].images
+            if images is not None:
+                place.imshow(images[frame])
     for place, name in zip(axes[:, 0], rows, strict=True):
         place.set_ylabel({"depth": "depth"}.get(name, WORDS.get(name, name)).removeprefix("the "), fontsize=7, wrap=True)
     for place in axes.ravel():
@@ -191,7 +193,7 @@ def drag_sequences(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
 def _shown(files: list[Any], count: int) -> "list[tuple[xarray.Dataset, np.ndarray]]":
     """(file, rows) of the longest unseen sequence of each of the first objects, else of any test."""
-    found = []
+    found: list[tuple[bool, int, xarray.Dataset, np.ndarray]] = []
     for file in files:
         data = read_dataset(file)
         for split in (UNSEEN, "held_out"):

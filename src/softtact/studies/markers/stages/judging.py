@@ -1,6 +1,6 @@
 """Tables, claims and the page."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -56,7 +56,7 @@ def _weights(names: Sequence[str]) -> dict[str, int]:
         }
 
 
-def _beside(table: pd.DataFrame, printed: dict[str, tuple[float, ...]], names: tuple[str, ...]) -> pd.DataFrame:
+def _beside(table: pd.DataFrame, printed: Mapping[str, tuple[float, ...]], names: tuple[str, ...]) -> pd.DataFrame:
     """A table with the printed numbers of the same columns beside, and rows of those sources that are only printed."""
     known = pd.DataFrame(
         [
