@@ -29,14 +29,15 @@ from softtact.errors import ConvergenceError
 
 _ON_RIM = 1 - 1e-12     # share of a disc's radius from which a force counts as being on the rim
 _SHORTENED = (1.0, 0.5, 0.25)
-_ROUNDING = 1e-13     # of an energy
+_ROUNDING = 1e-13     # of an energy, by operators in double precision
 
 
 def solve_in_discs(compliance: "Operator", linear: np.ndarray, bound: np.ndarray, q: np.ndarray, *,
                    settings: "CoulombSettings") -> tuple[np.ndarray, np.ndarray, int]:
     """q (c, 2) in N, the displacement T q (c, 2), and the number of products; from a first guess q.
 
-    compliance: T, mm/N;  linear (c, 2): b in mm;  bound (c,): radii in N, 0 where there is no contact
+    compliance: T, mm/N, with a `precondition` of residuals (c, 2) or none
+    linear (c, 2): b in mm;  bound (c,): radii in N, 0 where there is no contact
     """
     diagonal = compliance.diagonal.max(axis=1, keepdims=True)
     q, products = into_discs(q, bound), 1
@@ -48,13 +49,13 @@ def solve_in_discs(compliance: "Operator", linear: np.ndarray, bound: np.ndarray
         if largest <= settings.tolerance_mm:
             break
         face = _Face(q, slip, bound)
-        least = max(0.1 * settings.tolerance_mm, 0.01 * largest)
+        least=max(settings.inner_share * settings.tolerance_mm, settings.inner_fall * largest)
         change, moved_by, used = _on_face(compliance, face, slip, diagonal, settings, least=least)
         products += used
         found, used = _shortened(compliance, linear, bound, q, moved, change, moved_by, face)
         products += used
         if found is None:
-            safe = safe or _largest_eigenvalue(compliance, diagonal)
+            safe = safe or getattr(compliance, "largest_eigenvalue", None) or largest_eigenvalue(compliance, diagonal)
             trial = into_discs(q - slip / (safe * diagonal), bound)
             found, products = (trial, compliance @ trial), products + 1
         q, moved = found
@@ -93,7 +94,8 @@ def _on_face(compliance, face, slip, diagonal, settings, *, least):
     change, moved_by, products = np.zeros_like(slip), np.zeros_like(slip), 0
     residual = -face.project(slip)
     scale = 1 / (diagonal + face.multiplier)
-    direction = z = face.project(scale * residual)
+    precondition = _preconditioner(compliance, scale, diagonal)
+    direction = z = face.project(precondition(residual))
     rho = (residual * z).sum()
     while np.abs(residual).max(initial=0.0) > least and products < settings.inner_iterations:
         moved = compliance @ direction
@@ -102,15 +104,25 @@ def _on_face(compliance, face, slip, diagonal, settings, *, least):
         step = rho / (direction * curved).sum()
         change, moved_by = change + step * direction, moved_by + step * moved
         residual = residual - step * curved
-        z = face.project(scale * residual)
+        z = face.project(precondition(residual))
         before, rho = rho, (residual * z).sum()
         direction = z + rho / before * direction
     return change, moved_by, products
 
 
+def _preconditioner(compliance, scale, diagonal):
+    """About the inverse of the compliance on a face, of residuals (c, 2): its own, or else its diagonal's."""
+    own = getattr(compliance, "precondition", None)
+    if own is None:
+        return lambda residual: scale * residual
+    root = np.sqrt(scale * diagonal)      # 1 but for points on the rim, which turn against their force
+    return lambda residual: root * own(root * residual)
+
+
 def _shortened(compliance, linear, bound, q, moved, change, moved_by, face):
     """q and T q after the change, or a part of it, if that lowers the energy, else None; and the number of products."""
     before, products = _energy(q, moved, linear), 0
+    rounding = getattr(compliance, "rounding", _ROUNDING)
     for share in _SHORTENED:
         trial = q + share * change
         rim = face.rim
@@ -119,7 +131,7 @@ def _shortened(compliance, linear, bound, q, moved, change, moved_by, face):
         if np.array_equal(trial, q + change):
             return (trial, moved + moved_by), products     # no point left its disc: the quadratic's minimum on the face
         trial_moved, products = compliance @ trial, products + 1
-        if _energy(trial, trial_moved, linear) <= before + _ROUNDING * abs(before):
+        if _energy(trial, trial_moved, linear) <= before + rounding * abs(before):
             return (trial, trial_moved), products
     return None, products
 
@@ -128,7 +140,7 @@ def _energy(q, moved, linear):
     return 0.5 * (q * moved).sum() + (q * linear).sum()
 
 
-def _largest_eigenvalue(compliance, diagonal, *, iterations=20):
+def largest_eigenvalue(compliance: "Operator", diagonal: np.ndarray, *, iterations: int = 20) -> float:
     """Upper bound of the largest eigenvalue of T scaled by its `diagonal` (c, 1): power iteration with a margin."""
     x = np.sin(np.arange(2 * len(diagonal)) + 1.0).reshape(-1, 2)
     for _ in range(iterations):
@@ -150,6 +162,10 @@ class CoulombSettings:
     """Active sets within each."""
     inner_iterations: int = 400
     """Conjugate gradients on one active set."""
+    inner_share: float = 0.1
+    """Of the tolerance, to which friction is solved on one set of sliding points, ..."""
+    inner_fall: float = 0.01
+    """... or of the largest error when that set was found."""
 
 
 class Operator(Protocol):
@@ -254,7 +270,7 @@ def solve_increment(compliance: ContactCompliance, increment: Increment, *, norm
     count = len(increment.gap)
     p = _first_guess(compliance, increment) if normal is None or not normal.any() else normal.copy()
     q = np.zeros((count, 2)) if tangential is None else tangential.copy()
-    turns, products, raised, relaxation = 0, 0, (compliance.coupling @ q)[:, 0], _Relaxation()
+    turns, products, raised, relaxation = 0, 0, (compliance.coupling @ q)[:, 0], Relaxation()
     while turns < settings.max_turns:
         turns += 1
         p, depth, deflection, used = _solve_normal(compliance.normal, increment.gap + raised, p, increment, settings)
@@ -280,7 +296,7 @@ def solve_increment(compliance: ContactCompliance, increment: Increment, *, norm
     return CoulombContact(p, q, depth, increment.gap + raised + deflection - depth, slip, sticks, turns, products + 2)
 
 
-class _Relaxation:
+class Relaxation:
     """Aitken's relaxation factor: with high friction full changes oscillate with growing amplitude.
     Kuettler and Wall, Comput. Mech. 43 (2008) 61.
     """
@@ -290,7 +306,7 @@ class _Relaxation:
     def __init__(self):
         self._share, self._last = self._MOST, None
 
-    def of(self, change):
+    def of(self, change: np.ndarray) -> float:
         """The relaxation factor for this turn's change (c,)."""
         if self._last is not None:
             turned = change - self._last

@@ -69,6 +69,15 @@ class HeightField:
         height, _ = self(*(line.ravel() for line in np.meshgrid(x_mm, y_mm)))
         return float(min(corners[over, 2].min(initial=NO_CONTACT_MM), height.min()))
 
+    def points_below(self, height_mm: float) -> np.ndarray:
+        """Corners (n, 2) of the parts of the facets below a height: their own corners there, and where their edges cross it."""
+        start = self.triangles[self.triangles[..., 2].min(axis=1) < height_mm]
+        end = np.roll(start, -1, axis=1)
+        start, end = start.reshape(-1, 3), end.reshape(-1, 3)
+        cross = (start[:, 2] < height_mm) != (end[:, 2] < height_mm)
+        share = (height_mm - start[cross, 2]) / (end[cross, 2] - start[cross, 2])
+        return np.vstack([start[start[:, 2] < height_mm, :2], start[cross, :2] + share[:, None] * (end - start)[cross, :2]])
+
     def along_edges(self, below_mm: float, spacing_mm: float) -> np.ndarray:
         """Points (k, 3) on the edges of all facets below a height, from end to end in steps of at most `spacing_mm` in x and y."""
         near = self.triangles[..., 2].min(axis=1) < below_mm

@@ -51,6 +51,8 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
     surface: the underside of an object;  model: elastic or foundation
     Raises InputError where the object misses the sensor, ConvergenceError for a force that is not reached.
     """
+    if sensor.spec.edge.far:
+        raise InputError(f"{sensor.spec.name} is a gel with far sides, of which no maps over force are kept; press it by motions.")
     if model == "foundation":
         near = _near_touch(sensor, surface)
         return _on_foundation(sensor, near, forces_n, RunControl(label=""), time.perf_counter()).deformation_map_mm

@@ -21,6 +21,7 @@ from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_plain_body, build_sensor_body
 from softtact.press import choice
 from softtact.press.fast import press_elastic_motion
+from softtact.press.gel import press_gel
 from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.making import layered_surface
 from softtact.press.objects import placed_object
@@ -87,6 +88,8 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
     if task.soft:
         raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
                          "rigid mesh.")
+    if sensor.spec.edge.far and model == "elastic":
+        return _by_motion(sensor, task, press_gel, threads=task.control.threads)
     if task.motion.forces_n is not None:
         return _by_forces(sensor, task, choice.PRESSES[model], threads=task.control.threads if model == "elastic" else 1)
     motions = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
@@ -100,12 +103,23 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
 
 
 def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
-    """A press by the model that fits: solid for soft objects and turns, hyperelastic for motions, else by a policy."""
+    """A press by the model that fits: solid for soft objects and turns, hyperelastic for motions, else by a policy.
+
+    On a gel: elastic for all that it can follow.
+    """
+    if sensor.spec.edge.far and not task.soft and _flat(task.motion):
+        result = _by_motion(sensor, task, press_gel, threads=task.control.threads)
+        return replace(result, selection_reason="a gel's sides are far: the elastic model, which gives traction and slip")
     if task.soft or task.motion.turns or task.motion.loaded_aside:
         return press_pad(sensor, task)
     if task.motion.forces_n is None:
         return _by_motion(sensor, task, press_hyperelastic)
     return _by_forces(sensor, task, partial(choice.press_auto, policy=task.policy, tolerance_mm=task.tolerance_mm))
+
+
+def _flat(motion):
+    """Whether a motion has no tilts and no loads but along z."""
+    return not any({*step.ways} & {"rx", "ry"} or {*step.loads} - {"z"} for step in motion.steps)
 
 
 def _by_forces(sensor, task, press, *, threads=1):
@@ -137,7 +151,7 @@ def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callabl
         if not task.control.keep_object:
             return result
         return replace(result, placed_object=placed_object(placed, touch_mm=touch, indentation_mm=result.indentation_mm,
-                                                           aside_mm=task.motion.aside_mm))
+                                                           motion=task.motion))
 
     return placed, finish
 

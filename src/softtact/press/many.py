@@ -70,11 +70,13 @@ def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh | SoftObject, 
 
 def _pressed_all(sensor, jobs, batch):
     model, device = batch.model, batch.device
-    if jobs and on_gpu(device, model) and sensor.spec.base_held:     # the batch has no motion of a free lower side
+    if jobs and on_gpu(device, model) and sensor.spec.base_held and not sensor.spec.edge.far:   # no free lower side
         return press_batch(sensor, jobs, batch.force_n, device="cuda" if device == "auto" else device, workers=batch.workers,
                            label=batch.label)
     prepared = _PREPARED.get(model, ())
-    if model == "auto":
+    if model == "auto" and sensor.spec.has_layers and sensor.spec.edge.far:
+        prepared = ("elastic",)
+    elif model == "auto":
         prepared = models_to_prepare(sensor, policy=batch.options.get("policy", "error"))
     for name in prepared:
         sensor.prepared(name)

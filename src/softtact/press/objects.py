@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.motion import FREEDOMS, Motion
@@ -113,14 +114,17 @@ class PlacedObject:
                       for name, (field, _, _) in (_VARIABLES | _OF_TURN).items() if name in dataset})
 
 
-def placed_object(placed: trimesh.Trimesh, *, touch_mm: float, indentation_mm: np.ndarray, aside_mm: np.ndarray) -> PlacedObject:
-    """The `PlacedObject` of a mesh in its pose, from depths (step,) below first touch and displacements (step, 2) along x, y.
+def placed_object(placed: trimesh.Trimesh, *, touch_mm: float, indentation_mm: np.ndarray, motion: Motion) -> PlacedObject:
+    """The `PlacedObject` of a mesh in its pose, from depths (step,) below first touch and a motion along x, y and about z.
 
     touch_mm: descent from the pose to first touch
     """
     down = -(touch_mm + np.asarray(indentation_mm))
+    angle = np.cumsum([step.ways.get("rz", 0.0) for step in motion.steps])[:len(down)]
+    turn = Rotation.from_euler("z", angle[:, None], degrees=True).as_matrix() if angle.any() else None
+    middle = None if turn is None else np.append(placed.bounds.mean(axis=0)[:2], 0.0)
     return PlacedObject(points_mm=np.asarray(placed.vertices, dtype=float), triangles=np.asarray(placed.faces, dtype=np.int64),
-                        way_mm=np.column_stack([aside_mm[:len(down)], down]))
+                        way_mm=np.column_stack([motion.aside_mm[:len(down)], down]), turn=turn, about_mm=middle)
 
 
 # --- where an object first touches ---

@@ -24,6 +24,7 @@ from softtact.models.hyperelastic import newton
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.cache import cached_compliance, cached_foundation, seconds_to_prepare_foundation
+from softtact.press.gel import wide_layer
 from softtact.press.kinds import KINDS, MODELS
 from softtact.press.many import Batch, press_many
 from softtact.press.objects import SoftObject
@@ -107,7 +108,8 @@ class Sensor:
         where the sensor's file states it
         model: auto, or by name. On layers elastic and hyperelastic move an object along x, y and z, foundation straight down by
         force, solid takes turns, lateral loads and soft objects, too. `auto` is solid for these, hyperelastic for other motions,
-        and for forces alone chosen by a policy (see `policy`). A sensor of kind solid has the model solid alone.
+        and for forces alone chosen by a policy (see `policy`). On a gel, whose sides are far, elastic takes turns about z, too, and
+        `auto` is elastic unless only solid can follow. A sensor of kind solid has the model solid alone.
         options: see `PressOptions`
         Raises InputError for what the model cannot bear, and names one that can; ConvergenceError at a load step that is not
         reached: its `result` holds those before, as that of a KeyboardInterrupt and of a TimeLimitError does.
@@ -134,11 +136,12 @@ class Sensor:
         return press_many(self, list(zip(meshes, places, strict=True)), Batch.of(self.checked_forces(force_n), model, options))
 
     def prepared(self, model: str, threads: int = 1) -> Any:
-        """Prepared data of a fast model: `Compliance` or `FoundationCompliance`, computed on first use."""
+        """Prepared data of a fast model: `Compliance`, `WideLayer` of a gel, or `FoundationCompliance`, computed on first use."""
         self.spec.check_for(model)
         if model not in self.prepared_models:
-            self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
-                                 else cached_foundation(self.spec, self.laws, threads=threads))
+            self.prepared_models[model] = (cached_foundation(self.spec, self.laws, threads=threads) if model != "elastic"
+                                           else wide_layer(self.spec) if self.spec.edge.far
+                                           else cached_compliance(self.spec, threads=threads))
         return self.prepared_models[model]
 
     def seconds_to_prepare_foundation(self) -> float:
