@@ -34,6 +34,7 @@ from softtact.studies.markers.scoring import (
     table_two,
 )
 from softtact.studies.markers.shapes import OBJECTS, generated_object
+from softtact.studies.markers.stages.comparing import read_markers
 
 PRINTED = paths.Path((-4, 0, 4), tuple(range(-90, 91, 30)), 0.1, 1.5, 1.0)
 SMALL = paths.Path((0.0,), (0.0, 30.0), 0.25, 0.5, 0.5)
@@ -104,7 +105,7 @@ def pressed():
     """A file of two sequences of the made-up gel."""
     plans = [paths.SequencePlan("cone", "unseen", 0.0, 0.0, 0.0, 0.5, aside) for aside in ("x", "y")]
     return sequence_file(plans, [7, 8], lambda plan: made_up_frames(None, None, plan, SMALL), path=SMALL, pixels=64,
-                         deepest_mm=3.0, surface_maps=True)
+                         max_mm=3.0, surface_maps=True)
 
 
 def test_a_file_of_sequences_labels_every_frame(pressed):
@@ -241,6 +242,29 @@ def test_the_page_to_drag_holds_all_frames_and_loads_nothing():
     assert len(data[0]["frames"]) == 3
     assert data[0]["places"]["solved"][0] == [[1.0, 2.0], None]
     assert not re.search(r"https?:|src=\"(?!data:)|url\(|import", text)
+
+
+def test_markers_of_a_real_image_may_have_their_own_places_at_rest(tmp_path):
+    rest = rest_px()
+    table = pd.DataFrame(rest + 3, columns=["x_px", "y_px"])
+    table.to_csv(tmp_path / "now.csv", index=False)
+    table.assign(rest_x_px=rest[:, 0] + 1, rest_y_px=rest[:, 1]).to_csv(tmp_path / "both.csv", index=False)
+    assert read_markers(tmp_path / "now.csv", rest)[1] is rest
+    now, own_rest = read_markers(tmp_path / "both.csv", rest)
+    assert now == pytest.approx(rest + 3)
+    assert own_rest == pytest.approx(rest + [1, 0])
+
+
+@pytest.mark.parametrize(("table", "said"), [
+    (pd.DataFrame({"x": [1.0]}), "the column 'x_px' is missing; give x_px and y_px"),
+    (pd.DataFrame({"x_px": [1.0], "y_px": [1.0]}), "it has 1 rows and the sensor 16 markers"),
+    (pd.DataFrame({"x_px": 16 * [1.0], "y_px": 15 * [1.0] + [np.nan]}), "a place is not a number")])
+def test_a_table_of_markers_that_does_not_fit_is_refused(tmp_path, table, said):
+    table.to_csv(tmp_path / "markers.csv", index=False)
+    with pytest.raises(InputError, match=said):
+        read_markers(tmp_path / "markers.csv", rest_px())
+    with pytest.raises(InputError, match="there is no such file"):
+        read_markers(tmp_path / "other.csv", rest_px())
 
 
 SETTINGS = {

@@ -18,6 +18,7 @@ from softtact.sensors.specification import AnySpec, read_spec
 from softtact.studies.configuration import here_or_shipped, read_mapping, read_over, validated
 from softtact.studies.hybrid.keys import Name, NotNegative
 from softtact.studies.markers import paths
+from softtact.studies.markers.pressing import deepest_mm
 from softtact.studies.markers.shapes import OBJECTS
 from softtact.unknown_names import Section
 
@@ -165,7 +166,7 @@ class MarkerStudy:
     @property
     def deepest_mm(self) -> float:
         """Depth that grey 255 stands for: the depth readout's largest."""
-        return float((self.spec.readouts["depth"].model_extra or {})["max_mm"])
+        return deepest_mm(self.spec)
 
     def mesh_file(self, name: str) -> Path | None:
         """The file of an object, or None where it is generated."""

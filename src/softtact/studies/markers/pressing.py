@@ -18,7 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
+from softtact.geometry.meshes import place
+from softtact.imaging.depth_image import DepthCamera
+from softtact.readout.camera import camera_of
 from softtact.readout.depth import grey
 from softtact.studies.markers.paths import Path, SequencePlan, pose_on_sensor
 
@@ -72,18 +76,15 @@ Maker = Callable[["trimesh.Trimesh", SequencePlan, Path], Frames]
 
 
 def press_frames(sensor: "Sensor", mesh: "trimesh.Trimesh", plan: SequencePlan, path: Path) -> Frames:
-    """The `Frames` of a sequence, by the elastic model."""
-    result = sensor.press(
-        mesh, pose=pose_on_sensor(plan.x_mm, plan.y_mm, plan.angle_deg), motion=plan.motion(path), model="elastic"
-    )
+    """The `Frames` of a sequence, by the elastic model; depth images are a z-buffer of the mesh."""
+    pose = pose_on_sensor(plan.x_mm, plan.y_mm, plan.angle_deg)
+    result = sensor.press(mesh, pose=pose, motion=plan.motion(path), model="elastic")
     rest = rest_readings(sensor)
-    depth, image, px = (
-        np.concatenate([rest[name].values, result.readings[name].values]) for name in ("depth", "camera", "markers")
-    )
+    image, px = (np.concatenate([rest[name].values, result.readings[name].values]) for name in ("camera", "markers"))
     places = [np.stack([read["markers"][f"{axis}_mm"].values for axis in "xyz"], axis=-1) for read in (rest, result.readings)]
     slid = np.nan_to_num(result.slip)
     return Frames(
-        depth_mm=depth,
+        depth_mm=depth_images(sensor, place(mesh, pose=pose), result.indentation_mm, plan.motion(path).aside_mm),
         image=image,
         marker_px=px,
         marker_mm=np.concatenate(places),
@@ -96,12 +97,29 @@ def press_frames(sensor: "Sensor", mesh: "trimesh.Trimesh", plan: SequencePlan, 
     )
 
 
+def depth_images(sensor: "Sensor", placed: "trimesh.Trimesh", down_mm: np.ndarray, aside_mm: np.ndarray) -> np.ndarray:
+    """(1 + step, row, column) in mm: the depth of an object at rest and at each step, as the sensor's camera would see it.
+
+    down_mm (step,) from first touch, aside_mm (step, 2): the object's displacements
+    """
+    aside = np.vstack([np.zeros((1, 2)), aside_mm])
+    touch = HeightField(placed).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+    camera = DepthCamera(placed, camera_of(sensor.spec, "camera").pinhole, deepest_mm=deepest_mm(sensor.spec),
+                         reach_mm=float(np.abs(aside).max()), first_touch_mm=touch)
+    return np.stack([camera.image(down, way) for down, way in zip([0.0, *down_mm], aside, strict=True)])
+
+
+def deepest_mm(spec: Any) -> float:
+    """Depth that grey 255 stands for: the largest of a sensor's depth readout."""
+    return float((spec.readouts["depth"].model_extra or {})["max_mm"])
+
+
 def rest_readings(sensor: "Sensor") -> "dict[str, xarray.DataArray]":
-    """{name: (1, ...)} readings of depth, camera and markers without an object."""
+    """{name: (1, ...)} readings of camera and markers without an object."""
     from softtact.press.kinds import KINDS
     from softtact.readout.registry import readings_of
 
-    readouts = {name: one for name, one in sensor.readouts.items() if name in ("depth", "camera", "markers")}
+    readouts = {name: one for name, one in sensor.readouts.items() if name in ("camera", "markers")}
     return readings_of(readouts, KINDS[sensor.spec.kind].at_rest(sensor))
 
 
@@ -117,19 +135,19 @@ def sequence_file(
     *,
     path: Path,
     pixels: int,
-    deepest_mm: float,
+    max_mm: float,
     surface_maps: bool = False,
 ) -> "xarray.Dataset":
     """The data set of some sequences, numbered for the whole study.
 
-    make: the frames of a plan;  deepest_mm: depth that grey 255 stands for
+    make: the frames of a plan;  max_mm: depth that grey 255 stands for
     """
     import xarray
 
     parts: dict[str, list[np.ndarray]] = {}
     for plan, number in zip(plans, numbers, strict=True):
         frames = make(plan)
-        for name, values in (_labels(plan, number, path) | _values(frames, pixels, deepest_mm, surface_maps)).items():
+        for name, values in (_labels(plan, number, path) | _values(frames, pixels, max_mm, surface_maps)).items():
             parts.setdefault(name, []).append(values)
     joined = {name: np.concatenate(values) for name, values in parts.items()}
     data = xarray.Dataset({name: (_DIMENSIONS.get(name, ("frame",)), values, _attributes(name)) for name, values in joined.items()})
@@ -137,7 +155,7 @@ def sequence_file(
         data = data.assign_coords(x=("x", frames.x_mm, {"units": "mm"}), y=("y", frames.y_mm, {"units": "mm"}))
     for name in set(_DIMENSIONS) & set(joined):
         data[name].encoding = {"zlib": True, "complevel": 4}
-    return data.assign_attrs(deepest_mm=deepest_mm, camera_px=frames.image.shape[1])
+    return data.assign_attrs(max_mm=max_mm, camera_px=frames.image.shape[1])
 
 
 _DIMENSIONS = {
@@ -174,10 +192,10 @@ def _labels(plan: SequencePlan, number: int, path: Path) -> dict[str, np.ndarray
     return repeated | {"depth_mm": moved[:, 0], "aside_mm": moved[:, 1]}
 
 
-def _values(frames: Frames, pixels: int, deepest_mm: float, surface_maps: bool) -> dict[str, np.ndarray]:
+def _values(frames: Frames, pixels: int, max_mm: float, surface_maps: bool) -> dict[str, np.ndarray]:
     touching = frames.traction_mpa[..., 2] < 0
     found = {
-        "depth_grey": grey(reduced(frames.depth_mm, pixels), max_mm=deepest_mm),
+        "depth_grey": grey(reduced(frames.depth_mm, pixels), max_mm=max_mm),
         "image": np.round(reduced(frames.image, pixels)).astype(np.uint8),
         "marker_px": frames.marker_px.astype(np.float32),
         "marker_mm": frames.marker_mm.astype(np.float32),

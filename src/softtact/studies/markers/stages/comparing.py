@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from softtact.contact.motion import Motion
 from softtact.errors import InputError
 from softtact.evaluation.image_scores import motion_error_px, position_error_px
 from softtact.files import write_csv
 from softtact.studies.markers.paths import pose_on_sensor
-from softtact.studies.markers.pressing import rest_readings
+from softtact.studies.markers.pressing import deepest_mm, depth_images, rest_readings
 from softtact.studies.markers.stages.data import sensor_with
 
 if TYPE_CHECKING:
@@ -34,15 +35,18 @@ def compare_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings
     outputs: table (CSV: source, d_px, e_px), places (optional CSV: each marker's real and solved place)
     settings: pose [x mm, y mm, angle deg] of the sensor over the object, motion of the object on the sensor, friction (optional)
     """
-    from softtact.geometry.meshes import read_mesh
+    from softtact.geometry.meshes import place, read_mesh
 
     sensor = sensor_with(inputs["sensor"], settings.get("friction"))
-    solved, rest = _pressed(sensor, read_mesh(inputs["mesh"], unit="mm"), settings)
+    mesh, pose, motion = read_mesh(inputs["mesh"], unit="mm"), pose_on_sensor(*settings["pose"]), Motion.parse(settings["motion"])
+    result = sensor.press(mesh, pose=pose, motion=motion, model="elastic")
+    rest = rest_readings(sensor)["markers"].values[0]
     real, real_rest = read_markers(inputs["markers"], rest)
-    made = solved[-1] - rest + real_rest
+    made = result.readings["markers"].values[-1] - rest + real_rest
     sources = {"no_motion": (real_rest, real_rest), "physics": (made, real_rest)}
     if "generator" in inputs:
-        sources["network"] = _generated(sensor, inputs, settings, rest, threads)
+        depth = depth_images(sensor, place(mesh, pose=pose), result.indentation_mm, motion.aside_mm)
+        sources["network"] = _generated(sensor, inputs["generator"], depth, rest, threads)
     write_csv(outputs["table"], pd.DataFrame([
         {"source": name, "d_px": float(position_error_px(places, real)),
          "e_px": float(motion_error_px(places, real, made_at_rest=at_rest, real_at_rest=real_rest))}
@@ -68,16 +72,8 @@ def read_markers(path: str | Path, rest: np.ndarray) -> tuple[np.ndarray, np.nda
     return places, table[_REST].to_numpy(dtype=float) if set(_REST) <= set(table) else rest
 
 
-def _pressed(sensor: "Sensor", mesh: Any, settings: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Places (step, marker, 2) of the markers in px along the motion, and at rest (marker, 2)."""
-    result = sensor.press(mesh, pose=pose_on_sensor(*settings["pose"]), motion=settings["motion"], model="elastic")
-    return result.readings["markers"].values, rest_readings(sensor)["markers"].values[0]
-
-
-def _generated(sensor: "Sensor", inputs: dict[str, Any], settings: dict[str, Any], rest: np.ndarray,
-               threads: int) -> tuple[np.ndarray, np.ndarray]:
-    """(places, places at rest) of the markers in the images that a network makes of the depth images."""
-    from softtact.geometry.meshes import read_mesh
+def _generated(sensor: "Sensor", file: Path, depth_mm: np.ndarray, rest: np.ndarray, threads: int) -> tuple[np.ndarray, np.ndarray]:
+    """(places, places at rest) of the markers in the images that a network makes of depth images (n, row, column)."""
     from softtact.learning.image_training import generate
     from softtact.readout.camera import camera_of
     from softtact.readout.depth import grey
@@ -85,13 +81,8 @@ def _generated(sensor: "Sensor", inputs: dict[str, Any], settings: dict[str, Any
     from softtact.studies.markers.scoring import Camera, marker_places
     from softtact.studies.markers.stages.scoring import opened_generator
 
-    generator = opened_generator(inputs["generator"], threads)
-    result = sensor.press(read_mesh(inputs["mesh"], unit="mm"), pose=pose_on_sensor(*settings["pose"]), motion=settings["motion"],
-                          model="elastic")
-    depth = np.concatenate([rest_readings(sensor)["depth"].values, result.readings["depth"].values])
-    images = generate(generator, grey(reduced(depth, generator.options["pixels"]),
-                                      max_mm=float(sensor.spec.readouts["depth"].model_extra["max_mm"])))
-    camera = camera_of(sensor.spec, "camera")
+    generator, camera = opened_generator(file, threads), camera_of(sensor.spec, "camera")
+    images = generate(generator, grey(reduced(depth_mm, generator.options["pixels"]), max_mm=deepest_mm(sensor.spec)))
     radius = camera.markers.radius_mm / camera.pinhole.mm_per_px     # type: ignore[union-attr]
-    places = marker_places(images, Camera(depth.shape[1], radius, rest))
+    places = marker_places(images, Camera(depth_mm.shape[1], radius, rest))
     return places[-1], places[0]

@@ -46,7 +46,7 @@ def press_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
         press,
         path=press.path,
         pixels=settings["pixels"],
-        deepest_mm=settings["deepest_mm"],
+        max_mm=settings["deepest_mm"],
         surface_maps=settings["surface_maps"],
     )
     write_dataset(outputs["sequences"], data, seed=None, settings=settings)

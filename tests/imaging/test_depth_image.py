@@ -1,0 +1,64 @@
+"""Depth images against what a pinhole sees, by hand."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.imaging.depth_image import DepthCamera
+from softtact.imaging.pinhole import Pinhole
+
+PINHOLE = Pinhole(64, 64, 0.25, 35.0)      # 16 mm
+X = (np.arange(64) - 31.5) * 0.25          # of the pixels on the surface at rest
+
+
+def _box(width, height=5.0):
+    return trimesh.creation.box((width, width, height), transform=trimesh.transformations.translation_matrix((0, 0, height / 2)))
+
+
+def test_a_flat_punch_has_its_depth_inside_a_square_that_nearness_enlarges():
+    """Its lower face, 1.5 mm below the surface, is seen larger by 35 / 33.5; half a pixel is the resolution."""
+    depth = DepthCamera(_box(8.0), PINHOLE, deepest_mm=3.0, reach_mm=1.0).image(1.5, np.zeros(2))
+    inside = np.abs(X) < 4.0 * 35 / 33.5 - 0.13
+    outside = np.abs(X) > 4.0 * 35 / 33.5 + 0.13
+    assert depth[np.ix_(inside, inside)] == pytest.approx(1.5, abs=1e-3)
+    assert (depth[outside] == 0).all() and (depth[:, outside] == 0).all()
+
+
+def test_a_ball_has_the_depth_of_its_cap():
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=4.0)
+    ball.apply_translation([0, 0, 4.0])
+    depth = DepthCamera(ball, PINHOLE, deepest_mm=3.0, reach_mm=1.0).image(1.0, np.zeros(2))
+    row = depth[31]
+    r = np.abs(X) * (35 - row) / 35      # where the ray meets the ball
+    near = np.hypot(r, 0.125) < 2.4
+    cap = 1.0 - (4.0 - np.sqrt(16 - r[near]**2 - (0.125 * (35 - row[near]) / 35) ** 2))
+    assert row[near] == pytest.approx(cap, abs=0.06)      # half a pixel at the cap's slope
+    assert depth.max() == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_object_moves_in_the_image_as_it_moves():
+    camera = DepthCamera(_box(4.0), PINHOLE, deepest_mm=3.0, reach_mm=1.0)
+    still, moved = camera.image(1.0, np.zeros(2)), camera.image(1.0, np.array([1.0, 0.0]))
+    assert (moved > 0).sum(axis=0).argmax() - (still > 0).sum(axis=0).argmax() == pytest.approx(4, abs=1)
+    weight = np.array([(X * one.sum(axis=0)).sum() / one.sum() for one in (still, moved)])
+    assert np.diff(weight)[0] == pytest.approx(35 / 34, abs=0.1)
+
+
+def test_an_object_that_is_not_pressed_in_leaves_no_depth():
+    assert DepthCamera(_box(8.0), PINHOLE, deepest_mm=3.0, reach_mm=0.0).image(0.0, np.zeros(2)).max() == 0
+
+
+def test_a_depth_below_the_image_ends_at_its_deepest():
+    assert DepthCamera(_box(8.0), PINHOLE, deepest_mm=1.0, reach_mm=0.0).image(2.0, np.zeros(2)).max() == 1.0
+
+
+def test_an_inner_wall_is_seen_from_the_side():
+    """Of a ring with a hole of 4 mm: between the lower and the upper edge a ray meets the wall where u (35 - depth) = 4."""
+    ring = trimesh.creation.annulus(r_min=4.0, r_max=7.0, height=5.0, sections=256)
+    ring.apply_translation([0, 0, 2.5])
+    fine = Pinhole(257, 257, 0.05, 35.0)
+    depth = DepthCamera(ring, fine, deepest_mm=3.0, reach_mm=0.0).image(2.0, np.zeros(2))[128]
+    u = np.arange(257) * 0.05 / 35 - 128 * 0.05 / 35
+    wall = (u > 4.0 / 35 * 1.006) & (u < 4.0 / 33 * 0.994)
+    assert wall.sum() > 2
+    assert depth[wall] == pytest.approx(35 - 4.0 / u[wall], abs=0.25)      # half a pixel of 0.05 mm at this steep ray
