@@ -157,7 +157,7 @@ def test_forces_in_kilograms_are_noticed(bench):
 def test_a_modulus_that_runs_to_the_end_of_its_range_is_not_believed(bench, experiments):
     problem = Problem(bench.presses, experiments[:1], ("modulus",))
     best = problem.linear(np.concatenate(problem.changes(problem.mean)))
-    at_end = CalibrationResult(problem, problem.bounds[1].copy(), best, [], np.eye(1), [], 1.0, [])
+    at_end = CalibrationResult(problem, problem.bounds[1].copy(), best, [], np.eye(1), [], 1.0, [], 0.0, np.eye(1))
     with pytest.raises(InputError, match="fitted moduli are 2.00 times those of the materials, a bound of the fit; check"):
         check_result(at_end)
     check_result(replace(at_end, vector=problem.mean))

@@ -194,9 +194,11 @@ def _advice(result, candidate, largest_n):
     kinds = [name for name in ("ln modulus", "ln scale") if name in names] + ["gain", "zero"]
     noise = np.mean([one.noise_counts for one in problem.experiments]) * max(result.misfit, 1.0)
     jacobian = np.hstack([columns[name] for name in kinds]) / max(noise, np.sqrt(1 / 12)) * np.sqrt(_READINGS)
-    before = result.covariance[np.ix_(keep, keep)]
+    both = np.ix_(keep, keep)
+    before, of_model = result.noise_covariance[both], result.covariance[both] - result.noise_covariance[both]
     after = np.linalg.inv(np.linalg.inv(before) + jacobian.T @ jacobian)
     growth = 0.5 * (np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1])
     first, common = names.index("gain 0"), names.index("ln scale")
-    gains = np.diag(after)[first:first + taxels] + after[common, common] + 2 * after[common, first:first + taxels]
+    left = after + of_model
+    gains = np.diag(left)[first:first + taxels] + left[common, common] + 2 * left[common, first:first + taxels]
     return Advice(candidate, float(growth), float(np.sqrt(gains).mean()), float(forces[-1] * scale))

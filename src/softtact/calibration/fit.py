@@ -13,6 +13,7 @@ import numpy as np
 import yaml
 from scipy.optimize import least_squares
 
+from softtact.calibration.discrepancy import discrepancy
 from softtact.calibration.ladder import COVERS, Presses, parabola, with_cover, with_friction
 from softtact.calibration.problem import Linear, Problem
 from softtact.errors import ConvergenceError
@@ -42,13 +43,17 @@ class CalibrationResult:
     counts: list[np.ndarray]
     """Predicted (b, row, column) of each experiment."""
     covariance: np.ndarray
-    """(q, q) covariance of `names`, with the priors; a misfit beyond the noise counts as noise."""
+    """(q, q) covariance of `names`, with the priors and the error of the model; a misfit beyond the noise counts as noise, too."""
     names: list[str]
     """(q,) `problem.names`, `ln scale`, `gain 0` to the last taxel's, `zero 0` to the last taxel's."""
     misfit: float
     """Root mean square of the misfits over their noise: 1 if the model explains all but the noise."""
     not_identifiable: list[str]
     """Sentences on unknowns that these presses do not determine; empty if they determine all."""
+    model_error: float
+    """Relative error of the model's maps, estimated from the misfits (`calibration.discrepancy`)."""
+    noise_covariance: np.ndarray
+    """(q, q) the part of `covariance` that more presses reduce: without the error of the model."""
 
     @property
     def modulus_scale(self) -> float:
@@ -157,7 +162,10 @@ def _result(problem, vector):
     information = jacobian.T @ jacobian / max(misfit, 1.0) ** 2
     covariance = np.linalg.inv(information + np.diag(prior**-2.0))
     unknown = not_identifiable(names, information, covariance, prior, best.gain.shape)
-    return CalibrationResult(problem, vector, best, predicted, covariance, names, misfit, unknown)
+    off_prior = np.concatenate([vector - problem.mean, [0.0], (best.gain / best.scale - 1).ravel(), best.zero.ravel()])
+    wrong = discrepancy(problem, vector, best, misfits.ravel(), jacobian=jacobian, prior=prior, off_prior=off_prior)
+    return CalibrationResult(problem, vector, best, predicted, covariance + wrong.covariance, names, misfit, unknown,
+                             wrong.relative, covariance)
 
 
 def sensitivities(problem: Problem, vector: np.ndarray, best: Linear, change: np.ndarray,

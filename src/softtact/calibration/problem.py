@@ -20,6 +20,7 @@ from softtact.errors import InputError
 from softtact.press.ladder import Ladder
 from softtact.readout.hysteresis import lagged
 from softtact.readout.taxels import relative_change
+from softtact.readout.virtual_sensor import taxel_capacitance
 
 FITTED = ("placement", "relaxation", "modulus", "cover", "friction")
 HARDEST = 1 / SOFTEST
@@ -199,6 +200,21 @@ class Problem:
         return [self._change(k, (*shares, *times, scale, cover, friction, *self.place(vector, k)), shares, times)
                 for k in range(len(self.experiments))]
 
+    def changes_of(self, vector: np.ndarray, *, amplitude: float = 1.0, sheet_excess_mm: float = 0.0) -> list[np.ndarray]:
+        """`changes` with the maps times `amplitude`, and a sheet thicker by `sheet_excess_mm` over all taxels."""
+        shares, times = self.creep(vector)
+        scale, cover = np.exp(self.value(vector, "ln modulus", 0.0)), self.value(vector, "cover", 1.0)
+        friction = self.value(vector, "friction", 0.0)
+        return [self.change_of(amplitude * self._maps(k, shares, times, scale, cover, friction, self.place(vector, k)),
+                               sheet_excess_mm=sheet_excess_mm) for k in range(len(self.experiments))]
+
+    def change_of(self, maps_mm: np.ndarray, *, sheet_excess_mm: float = 0.0) -> np.ndarray:
+        """dC/C0 (..., row, column) under maps (..., y, x) in mm, with a sheet thicker by `sheet_excess_mm` over all taxels."""
+        spec = self.presses.sensor.spec
+        rest, pressed = (taxel_capacitance(spec, maps, sheet_excess_mm=sheet_excess_mm)
+                         for maps in (np.zeros(maps_mm.shape[-2:]), maps_mm))
+        return pressed / rest - 1
+
     def _change(self, k, key, shares, times):
         """dC/C0 of one experiment, cached while its unknowns stay the same."""
         if key not in self._known[k]:
@@ -209,6 +225,10 @@ class Problem:
         return self._known[k][key]
 
     def _read(self, k, shares, times, scale, cover, friction, place):
+        return relative_change(self.presses.sensor.spec, self._maps(k, shares, times, scale, cover, friction, place))
+
+    def _maps(self, k, shares, times, scale, cover, friction, place):
+        """Maps (b, y, x) in mm of one experiment."""
         one, off = self.experiments[k], np.subtract(place, self._places[k])
 
         def binned(ladder, maps):     # in the recording's bins
@@ -222,7 +242,7 @@ class Problem:
             maps = maps + share * binned(ladder, pressed)
         for share, ladder in self.friction_changes(k, friction):
             maps = maps + share * binned(ladder, ladder.maps_mm)
-        return relative_change(self.presses.sensor.spec, maps)
+        return maps
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """Counts (n, row, column) of all experiments, and the inverse of their standard deviations, which is 0 for dead and

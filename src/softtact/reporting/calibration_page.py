@@ -28,7 +28,8 @@ def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[s
     page.box("What was left out.", notes)
     page.section("What was found", anchor="found")
     page.table(pd.DataFrame(_rows(result), columns=["number", "value", "standard deviation"]))
-    page.text("A misfit beyond noise counts as noise in these deviations; the error of the model is not in them.")
+    page.text("A misfit beyond noise counts as noise in these deviations. The error of the model is in them, too: from these "
+              f"misfits and what is known of it, {100 * result.model_error:.1f} % of a map.")
     page.section("Figures")
     for caption, figure in (
             ("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's validity, "
