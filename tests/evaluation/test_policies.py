@@ -7,6 +7,7 @@ import xarray
 
 from softtact.evaluation.policies import CHANCE, choices, expected_over_true, policy_table, press_table, with_chance
 from softtact.press.choice import INTERVALS
+from softtact.studies.hybrid.figures.fig8_policies import draw
 
 FORCES = np.array([10.0, 20.0])
 BUMP = np.exp(-np.linspace(-2, 2, 9)[:, None] ** 2 - np.linspace(-2, 2, 7) ** 2)
@@ -16,7 +17,9 @@ SIZE = np.sqrt((BUMP**2).mean())
 def data_set(item, of_set, amplitude, *, time, compression=0.1):
     return xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), amplitude * (FORCES / 20)[:, None, None] * BUMP),
                            "frustum_compression_mm": ("step", compression * FORCES / 20), "wall_time_s": ("step", [time, time]),
-                           "within_validity": ("step", [1, 1]), "indentation_mm": ("step", [0.1, 0.2])},
+                           "within_validity": ("step", [1, 1]), "indentation_mm": ("step", [0.1, 0.2]),
+                           "tactile_map": (("step", "row", "column"), np.outer(1000 * amplitude * FORCES / 20,
+                                                                               np.ones(28)).reshape(2, 7, 4))},
                           attrs={"item": item, "set": of_set, "thickness_mm": 2.5})
 
 
@@ -37,6 +40,7 @@ def test_a_press_counts_with_its_worst_load_step_and_the_time_of_all(table):
     assert cup.foundation_error_mm == pytest.approx(0.2 * 0.03 * SIZE)
     assert cup.elastic_error_mm == pytest.approx(0.2 * SIZE)
     assert (cup.elastic_time_s, cup.hyperelastic_time_s) == (0.2, 200.0)
+    assert (cup.elastic_error_counts, cup.hyperelastic_error_counts) == pytest.approx((28 * 200.0, 0.0))
 
 
 def test_an_error_that_is_the_same_everywhere_is_found_exactly(table):
@@ -105,3 +109,17 @@ def test_the_error_policy_pays_for_both_cheap_models_and_others_for_their_own(ta
 
 def test_only_the_sets_asked_for_are_counted(table):
     assert set(policy_table(table, [0.01], sets=["grasps"]).presses) == {1}
+
+
+def test_errors_in_counts_stand_beside_those_of_the_maps_and_are_unknown_of_presses_without_taxels(table):
+    rows = policy_table(table, [0.01], sets=["grasps"]).set_index("policy")
+    assert rows.mean_error_counts[["always elastic", "always foundation", "paper"]].tolist() == pytest.approx([5600.0, 168.0, 0.0])
+    bare = {model: one.drop_vars("tactile_map") for model, one in press("ring", "indenters", apart=0.03).items()}
+    assert press_table([bare], {"ring": "elastic"}, height_mm=0.5)[0].elastic_error_counts.isna().all()
+
+
+def test_figure_8_marks_the_random_choice_of_the_rules_share(table):
+    rows = policy_table(table, [0.01], sets=["grasps", "indenters"])
+    axes = draw(rows, table).axes[0]
+    assert "a random choice of the rule's share" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "random" in [text.get_text() for text in axes.texts]

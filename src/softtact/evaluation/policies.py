@@ -1,9 +1,9 @@
 """Time and error of policies that choose a model: by the paper's rule, by the expected error, or always the same model.
 
-The error of a press is the root mean square difference in mm of its map from the hyperelastic model's, at the worst load step. Its
-time is that of all load steps; the `error` policy also pays for both fast models, which it presses first. The expected error is
-calibrated on one set of presses (the indenters) and tested on the others. A model is chosen if nine of ten such presses are within
-the tolerance, as by default.
+The error of a press is the root mean square difference in mm of its map from the hyperelastic model's, at the worst load step; in
+counts, the largest difference of the sums over all taxels, which is what users read. Its time is that of all load steps; the
+`error` policy also pays for both fast models, which it presses first. The expected error is calibrated on one set of presses (the
+indenters) and tested on the others. A model is chosen if nine of ten such presses are within the tolerance, as by default.
 """
 
 from collections.abc import Iterable, Sequence
@@ -46,6 +46,14 @@ def _errors(press):
     return {model: rms(press[model].deformation_map_mm.values - truth) for model in MODELS}
 
 
+def _count_errors(press):
+    """{model: largest difference of the counts of all taxels from the hyperelastic model's}; nan for presses without readings."""
+    if not all("tactile_map" in press[model] for model in MODELS):
+        return dict.fromkeys(MODELS, np.nan)
+    counts = {model: press[model].tactile_map.values.sum(axis=(1, 2)) for model in MODELS}
+    return {model: float(np.abs(counts[model] - counts["hyperelastic"]).max()) for model in MODELS}
+
+
 def _row(press, paper_choice, calibrated, height_mm):
     errors = _errors(press)
     expected = expected_errors(press["elastic"], press["foundation"], height_mm=height_mm,
@@ -54,8 +62,9 @@ def _row(press, paper_choice, calibrated, height_mm):
     row = {"set": press["elastic"].attrs["set"], "item": name, "paper_model": paper_choice[name],
            "largest_mm": float(press["hyperelastic"].deformation_map_mm.max()),
            "foundation_valid": bool(press["foundation"].within_validity.values.all())}
+    in_counts = _count_errors(press)
     for model in MODELS:
-        row[f"{model}_error_mm"] = float(errors[model].max())
+        row[f"{model}_error_mm"], row[f"{model}_error_counts"] = float(errors[model].max()), in_counts[model]
         row[f"{model}_time_s"] = float(press[model].wall_time_s.sum())
     return row | {f"{model}_expected_mm": float(values.max()) for model, values in expected.items()}
 
@@ -92,7 +101,7 @@ def with_chance(policies: pd.DataFrame) -> pd.DataFrame:
         return policies
     shares = by_name.loc["paper", [f"share_{model}" for model in MODELS]]
     means = {name: float(shares.to_numpy(dtype=float) @ by_name.loc[models, name].to_numpy(dtype=float))
-             for name in ("mean_error_mm", "time_per_press_s", "time_in_all_s")}
+             for name in ("mean_error_mm", "mean_error_counts", "time_per_press_s", "time_in_all_s") if name in policies}
     row = {"policy": CHANCE, "presses": by_name.presses["paper"], **shares, **means}
     place = list(policies.policy).index("paper") + 1
     return pd.concat([policies.iloc[:place], pd.DataFrame([row]), policies.iloc[place:]], ignore_index=True)
@@ -106,7 +115,9 @@ def _summary(table, policy, chosen, tolerance):
         time = table.elastic_time_s + table.foundation_time_s + np.where(chosen == "hyperelastic", table.hyperelastic_time_s, 0.0)
     summary = {"policy": policy, "presses": len(table)}
     summary |= {f"share_{model}": float((chosen == model).mean()) for model in MODELS}
-    summary |= {"mean_error_mm": error.mean(), "largest_error_mm": error.max(), "time_per_press_s": time.mean(),
+    in_counts = _of_chosen(table, chosen, "error_counts")
+    summary |= {"mean_error_mm": error.mean(), "largest_error_mm": error.max(), "mean_error_counts": in_counts.mean(),
+                "largest_error_counts": in_counts.max(), "time_per_press_s": time.mean(),
                 "time_in_all_s": time.sum()}
     return summary | {"over_tolerance": float((error > tolerance).mean()) if by_error else np.nan}
 

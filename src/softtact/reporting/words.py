@@ -35,6 +35,8 @@ HEADERS = {
     "max_s": "longest, s", "sd_s": "standard deviation, s", "machine": "machine", "policy": "policy", "presses": "presses",
     "share_elastic": "share elastic", "share_foundation": "share foundation", "share_hyperelastic": "share hyperelastic",
     "mean_error_mm": "mean distance from the hyperelastic map, mm", "largest_error_mm": "largest distance, mm",
+    "mean_error_counts": "mean distance from the hyperelastic reading, counts of all taxels",
+    "largest_error_counts": "largest distance, counts",
     "time_per_press_s": "time of a press, s",
     "time_in_all_s": "time in all, s", "over_tolerance": "share above the tolerance", "paper": "paper",
     "perfect_model_gain": "gain by a perfect model", "more_maps_gain": "gain by more maps",

@@ -34,8 +34,9 @@ CAPTIONS = {
                  "tactile maps predicted from them, and those that the sensor (virtual, or recorded) read, the mean of its "
                  "trials. Jet colours and turned 90 degrees as printed; tactile maps from 0 to the readout's largest count; red: "
                  "the model chosen by the complexity rule.",
-    "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
-                     "Right: the error that was expected before the costly model ran, against the true one.",
+    "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model, "
+                     "which has no error by definition: its own mesh's is stated above. Right: the error that was expected before "
+                     "the costly model ran, against the true one.",
     "fig9_networks": "Figure 9. The paper's network and another architecture on the same split. Left: mean SSIM with its 95 % "
                      "interval (bootstrap over objects, then trials). Right: loss and SSIM of the validation maps after an epoch.",
     "fig10_learning_curve": "Figure 10. Mean SSIM against the number of training maps, with its 95 % interval (bootstrap over "

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softtact.evaluation.policies import CHANCE
 from softtact.reporting.style import MODEL_COLOURS, pyplot
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ _BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
 _ABOVE = {"xytext": (5, 5), "ha": "left", "va": "bottom"}
 # For each kind of policy: mark, colour, meaning and position of its texts, below or above so that near ones do not overlap.
 _KINDS = {"always": ("s", "0.45", "always the same model", _BELOW), "paper": ("D", "#b22222", "the paper's rule", _ABOVE),
+          "random": ("X", "#8a5a9e", "a random choice of the rule's share", _BELOW),
           "error": ("o", "#1f7a4d", "by expected error, tolerance of", _ABOVE)}
 
 
@@ -53,6 +55,8 @@ def _places(policies, *, width):
 
 def _in_short(names):
     """Short text for policies of one kind: a model, or tolerances in rising order."""
+    if names[0] == CHANCE:
+        return "random"
     if not names[0].startswith("error"):
         return ", ".join(name.removeprefix("always ") for name in names if name != "paper")
     return ", ".join(f"{tolerance:g}" for tolerance in sorted(float(name.split()[1]) for name in names)) + " um"
