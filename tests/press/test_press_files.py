@@ -10,6 +10,7 @@ import softtact
 from softtact.errors import InputError
 from softtact.press.result import PressResult, read_press
 from softtact.readout.registry import labelled
+from softtact.readout.taxels import counts_of
 
 
 def made_up_press():
@@ -17,7 +18,7 @@ def made_up_press():
     rng = np.random.default_rng(4)
     numbers = {name: rng.random(2) for name in ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm",
                                                 "wall_time_s", "extrapolated_volume_fraction", "expected_error_mm")}
-    return PressResult(deformation_map_mm=rng.random((2, 5, 3)),
+    return PressResult(deformation_map_mm=rng.random((2, 5, 3)), thinning_map_mm=rng.random((2, 5, 3)),
                        readings={"taxels": labelled(rng.random((2, 7, 4)), ("step", "row", "column"), units="counts")},
                        normal_force_n=np.array([5.0, 20.0]),
                        residual_n=np.full(2, np.nan), iterations=np.array([3, 4]), converged=np.ones(2, dtype=np.int8),
@@ -49,11 +50,14 @@ def test_a_press_is_read_back_to_the_bit(tmp_path):
 def test_a_press_of_the_elastic_model_is_read_back_and_written_again_with_the_same_bytes(tmp_path):
     import trimesh
 
-    block = trimesh.creation.box((6.0, 6.0, 3.0))
-    result = softtact.load_sensor("coro").press(block, force_n=[5, 20], model="elastic", threads=1)
+    bar = trimesh.creation.box((1.2, 10.0, 3.0))
+    sensor = softtact.load_sensor("coro")
+    result = sensor.press(bar, force_n=[5, 20], model="elastic", threads=1)
     result.write(tmp_path / "press.nc")
     read = softtact.read_press(tmp_path / "press.nc")
     assert_same(read, result)
+    assert (counts_of(sensor.spec, read.thinning_map_mm) == result.tactile_map).all(), "the counts of the press, from its file"
+    assert counts_of(sensor.spec, read.deformation_map_mm)[0].sum() < 0.95 * result.tactile_map[0].sum(), "its points read less"
     read.write(tmp_path / "again.nc")
     assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "press.nc").read_bytes()
 

@@ -101,13 +101,18 @@ def gain_table(references: "Sequence[xarray.Dataset]", tested: "Mapping[str, Seq
                "peak_counts": np.median(counts.max(axis=(1, 2))),
                "full_share": float((counts >= spec.largest_counts).mean()), "mean_counts": counts.mean()}
         predicted = {"mean": others_mean(counts)} if len(counts) > 1 else {}
-        predicted |= {f"gap_{model}": np.stack([ideal_counts(spec, press.deformation_map_mm.values[-1],
-                                                             counts_per_relative_change=gain) for press in presses])
+        predicted |= {f"gap_{model}": np.stack([ideal_counts(spec, _thinning(press)[-1], counts_per_relative_change=gain)
+                                                for press in presses])
                       for model, presses in tested.items()}
         row |= {f"ssim_{name}": map_ssim(maps, counts, **ssim).mean() for name, maps in predicted.items()}
         row |= {f"mae_share_{name}": mean_absolute_counts(maps, counts).mean() / counts.mean() for name, maps in predicted.items()}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _thinning(press):
+    """Maps (step, y, x) in mm from which a press' counts follow."""
+    return (press.thinning_map_mm if "thinning_map_mm" in press else press.deformation_map_mm).values
 
 
 def _last_reading(press, spec, settings, seed):

@@ -48,9 +48,9 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
     surface = layered_surface(spec, thinning, arrays.get("displacement_mm", -maps[..., None] * [np.nan, np.nan, 1.0]), pressure)
     surface = surface if plane is None else replace(surface, plane=plane)
-    return PressResult(deformation_map_mm=maps, readings=readings_of(sensor.readouts, surface), normal_force_n=forces,
-                       wall_time_s=times, x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
-                       largest_counts=spec.largest_counts,
+    return PressResult(deformation_map_mm=maps, thinning_map_mm=thinning, readings=readings_of(sensor.readouts, surface),
+                       normal_force_n=forces, wall_time_s=times, x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model,
+                       sensor=spec.name, solver=solver, largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, "edge": spec.edge.in_words, **_friction(spec, model),
                                    **_calibration(spec), **sensor.attributes}, **flags, **arrays)
 

@@ -52,6 +52,10 @@ class PressResult:
 
     deformation_map_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
     """(step, y, x) in mm: how far the sensing surface moved towards the board, positive."""
+    thinning_map_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE | _LATER)
+    """(step, y, x) in mm: how much thinner the layer is, as its taxels read it; `counts_of` of it gives the counts of the press.
+    Of the elastic model each point reads its surroundings, which differ from the map beside edges and thin walls; the lower side
+    may move, too. Elsewhere it is the deformation map, and files then hold that one alone."""
     readings: "dict[str, xarray.DataArray]" = field(default_factory=dict)
     """What each of the sensor's readouts reads, by their names in its file; `step` is the first dimension. `taxels`: (step, row,
     column) in counts, the ideal reading, or that of a calibrated sensor long after the press."""
@@ -139,6 +143,7 @@ class PressResult:
         if self.deformation_map_mm is not None:
             unknown = np.where(down == 0, np.nan, 1.0)
             defaults |= {"displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
+                         "thinning_map_mm": lambda: self.deformation_map_mm,
                          "traction_mpa": lambda: np.full((*self.deformation_map_mm.shape, 3), np.nan),
                          "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan)}
         elif self.solid is not None:
@@ -274,6 +279,8 @@ def _dataset_of(result: PressResult) -> "xarray.Dataset":
     plane = result.deformation_map_mm is not None
     for one in _arrays():
         if getattr(result, one.name) is None or ("plane" in one.metadata and not plane):
+            continue
+        if one.name == "thinning_map_mm" and np.array_equal(result.thinning_map_mm, result.deformation_map_mm):
             continue
         kept = coordinates if one.metadata["coordinate"] else variables
         kept[_name(one)] = (one.metadata["dimensions"], getattr(result, one.name), {"units": one.metadata["units"]})
