@@ -127,7 +127,8 @@ class BallOnLayer:
     def _density(self, t: np.ndarray) -> np.ndarray:
         return legendre.legval(t / self.contact_radius, self._solution[0])
 
-    def _transform(self, waves: np.ndarray) -> np.ndarray:
+    def transform(self, waves: np.ndarray) -> np.ndarray:
+        """Hankel transform of the pressure times C, (wave,)."""
         points, weights = self._points
         return np.cos(np.outer(waves, points)) @ (weights * self._density(points))
 
@@ -141,7 +142,7 @@ class BallOnLayer:
         angles, weights = self._angles(radius)
         half_space = np.sum(weights * self._density(radius[..., None] * np.sin(angles)), axis=-1)
         waves, kernel = self._waves
-        return half_space + j0(radius[..., None] * waves) @ (kernel * self._transform(waves))
+        return half_space + j0(radius[..., None] * waves) @ (kernel * self.transform(waves))
 
     def _outer_slope(self, radius):
         angles, weights = self._angles(radius)
@@ -149,4 +150,4 @@ class BallOnLayer:
         t = radius[..., None] * np.sin(angles)
         half_space = np.sum(weights * np.sin(angles) * legendre.legval(t / self.contact_radius, gradient), axis=-1)
         waves, kernel = self._waves
-        return half_space - j1(radius[..., None] * waves) @ (kernel * waves * self._transform(waves))
+        return half_space - j1(radius[..., None] * waves) @ (kernel * waves * self.transform(waves))
