@@ -1,6 +1,7 @@
 # `make`: the default study.  `make tiny`: its smallest form.  `make docs`: the documentation.
 # `make skin`, `make grasps`, `make probe`: a robot skin, grasps by a robot, a palpation sensor; `make tiny-skin` and so on: their smallest forms.
 # `make decide`: do the paper's claims hold? Some hours.  `make markers`: images of a gel with a camera, within an hour.
+# `make real`: gels with a camera against measured data, which docs/how-to/real_gels.md names.
 # `make everything`: all default studies.  `make studies`: the smallest forms of all.  `make overview`: Snakemake's report of them.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results page in docs/, from a finished run of the default study.
@@ -9,10 +10,10 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-DEFAULT_STUDIES = config skin probe grasps decide markers
-TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps tiny-decide tiny-markers
+DEFAULT_STUDIES = config skin probe grasps decide markers real
+TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps tiny-decide tiny-markers tiny-real
 
-.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide markers test test-slow lint advice bench docs numbers results clean
+.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide markers real test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -20,11 +21,11 @@ study: .venv/installed
 
 # Snakemake looks for jobs every second in small studies; workflow/profiles/default says why less often in large ones.
 $(TINY_STUDIES): SNAKEMAKE += --max-jobs-per-timespan 1000/1s
-$(TINY_STUDIES) skin probe grasps decide markers: .venv/installed
+$(TINY_STUDIES) skin probe grasps decide markers real: .venv/installed
 	$(SNAKEMAKE) --configfile config/$(subst -,_,$@).yaml
 	@echo "Open results/$(subst -,_,$@)/report.html"
 
-everything: study skin probe grasps decide markers
+everything: study skin probe grasps decide markers real
 
 studies: $(filter-out tiny-decide,$(TINY_STUDIES))
 
@@ -56,7 +57,7 @@ lint: .venv/tested
 
 # Advice on the workflow; what of it stays, and why, stands in workflow/README.md.
 advice: .venv/tested
-	-for name in tiny tiny_skin tiny_probe tiny_grasps tiny_decide tiny_markers; do $(BIN)/snakemake --configfile config/$$name.yaml --lint; done
+	-for name in tiny tiny_skin tiny_probe tiny_grasps tiny_decide tiny_markers tiny_real; do $(BIN)/snakemake --configfile config/$$name.yaml --lint; done
 	@sed -n '/^## Advice/,/^## /p' workflow/README.md
 
 # The workflow finds its own interpreter; the environment need not be activated.

@@ -16,20 +16,22 @@ from softtact.studies.decide.config import DecideValues
 from softtact.studies.grasps.config import GraspValues
 from softtact.studies.hybrid.keys import Values
 from softtact.studies.markers.config import MarkerValues
+from softtact.studies.real.config import RealValues
 
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = {"hybrid": (Values, "config.yaml", "tiny.yaml"), "skin": (SkinDesign, "skin.yaml", "tiny_skin.yaml"),
           "palpation": (PalpationDesign, "probe.yaml", "tiny_probe.yaml"),
           "grasps": (GraspValues, "grasps.yaml", "tiny_grasps.yaml"),
           "decide": (DecideValues, "decide.yaml", "tiny_decide.yaml"),
-          "markers": (MarkerValues, "markers.yaml", "tiny_markers.yaml")}
+          "markers": (MarkerValues, "markers.yaml", "tiny_markers.yaml"),
+          "real": (RealValues, "real.yaml", "tiny_real.yaml")}
 HEAD = """# The keys of all studies
 
 Written by `scripts/write_config_keys.py` from the models that check them; edit those.
 
 A file of this folder is one study: `snakemake --cores all --configfile config/NAME.yaml`. `study` names its folder below
-`results/`, `kind` says which kind it is (without it: hybrid). What a study of kind hybrid, grasps, decide or markers does not state
-is as in `config.yaml`, `grasps.yaml`, `decide.yaml` or `markers.yaml`. A value that is not printed in a paper may be written
+`results/`, `kind` says which kind it is (without it: hybrid). What a study of kind hybrid, grasps, decide, markers or real does not
+state is as in `config.yaml`, `grasps.yaml`, `decide.yaml`, `markers.yaml` or `real.yaml`. A value that is not printed in a paper may be written
 `{value: ..., assumed: true, reason: ...}`.
 `objects/` holds the meshes and their catalogue, `costs.yaml` the times that `softtact cost` tells.
 """

@@ -6,6 +6,7 @@ Inside the contact's circle the surface is the ball. Outside it rises smoothly t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -14,7 +15,9 @@ from softtact.errors import InputError
 from softtact.imaging.shading import Shading, ShadingSamples
 from softtact.models.elastic.ball_on_layer import BallOnLayer
 
-_PROFILE = 240      # radii at which the layer's profile is computed, between which it is linear
+_PROFILE = 90       # distances at which the layer's profile is computed, between which it is linear
+_LAYERS = 17        # layers for which it is computed
+_THINNESS = (0.02, 9.0)     # contact radius over the layer's thickness: at the least, a half-space
 
 
 @dataclass(frozen=True)
@@ -93,11 +96,37 @@ def ball_slopes(x_px: np.ndarray, y_px: np.ndarray, contact_px: float, gel: Gel)
 
     Raises InputError if the contact is as large as the ball.
     """
-    layer = BallOnLayer(contact_px, gel.ball_px, gel.thickness_px, gel.poisson)
+    if not 0 < contact_px < gel.ball_px:
+        raise InputError(f"the contact radius {contact_px:g} px is not between 0 and the ball's radius {gel.ball_px:g} px; correct "
+                         "one of them.")
     distance = np.hypot(x_px, y_px)
-    radii = contact_px * np.concatenate([np.linspace(0, 1, _PROFILE // 3), 1 + np.geomspace(1e-6, 30, _PROFILE)])
-    over_distance = np.interp(distance, radii, -layer.slope(radii)) / np.maximum(distance, 1e-9)
+    edge = contact_px / np.sqrt(gel.ball_px**2 - contact_px**2)
+    over_distance = np.where(distance <= contact_px, 1 / np.sqrt(gel.ball_px**2 - np.minimum(distance, contact_px)**2),
+                             edge * _outside(distance / contact_px, contact_px / gel.thickness_px, gel.poisson)
+                             / np.maximum(distance, 1e-9))
     return np.stack([over_distance * x_px, over_distance * y_px], axis=-1)
+
+
+def _outside(ratio, thinness, poisson):
+    """Slope outside the contact over that at its edge, at distances over the contact radius; thinness: contact over thickness."""
+    profiles = _profiles(poisson)
+    place = np.clip((np.log(max(thinness, _THINNESS[0])) - np.log(_THINNESS[0])) / np.log(_THINNESS[1] / _THINNESS[0]), 0, 1)
+    place *= len(profiles) - 1
+    low = min(int(place), len(profiles) - 2)
+    profile = (1 - place + low) * profiles[low] + (place - low) * profiles[low + 1]
+    return np.interp(ratio, _ratios(), profile)
+
+
+@cache
+def _profiles(poisson):
+    """Profiles (thinness, ratio), for thinnesses in equal steps of their logarithm."""
+    thinness = np.geomspace(*_THINNESS, _LAYERS)
+    slopes = np.array([BallOnLayer(1.0, 100.0, 1 / one, poisson).slope(_ratios() + 1e-9) for one in thinness])
+    return slopes / slopes[:, :1]
+
+
+def _ratios():
+    return 1 + np.concatenate([[0.0], np.geomspace(1e-4, 30, _PROFILE)])
 
 
 def joined_samples(presses: Sequence[BallPress], gel: Gel, *, reach: float = 1.0, step: int = 1) -> ShadingSamples:
@@ -112,11 +141,11 @@ def refined_circle(press: BallPress, gel: Gel, shading: Shading, *, reach: float
     most_px: how far the centre may move
     """
     x, y = press.square(reach * press.radius_px, step=step)
-    seen = press.difference[y, x]
+    seen, places = press.image[y, x].astype(float) - press.background[y, x], shading.at_places(x, y)
 
     def residual(circle):
         slopes = ball_slopes(x - circle[0], y - circle[1], circle[2], gel)
-        return (shading.difference(slopes[..., 0], slopes[..., 1], x, y) - seen).ravel() / 10
+        return (shading.difference_at(slopes[..., 0], slopes[..., 1], places) - seen).ravel() / 10
 
     start = np.array([*press.centre_px, min(press.radius_px, 0.95 * gel.ball_px)])
     reach_px = np.array([most_px, most_px, np.inf])

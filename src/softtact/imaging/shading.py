@@ -58,7 +58,7 @@ class ShadingSamples:
 
 @dataclass(frozen=True)
 class Shading(ABC):
-    """A model of the colours; its kinds differ in `_difference`."""
+    """A model of the colours; its kinds differ in `difference_at`."""
 
     kind: ClassVar[str]
     pixels: tuple[int, int]
@@ -70,7 +70,7 @@ class Shading(ABC):
 
     def difference(self, slope_x: np.ndarray, slope_y: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """Colour minus background (..., 3) in grey levels, not cut; all arguments are of one shape or broadcast."""
-        return self._difference(slope_x, slope_y, self._prepared(x_px, y_px))
+        return self.difference_at(slope_x, slope_y, self.at_places(x_px, y_px))
 
     @classmethod
     @abstractmethod
@@ -91,15 +91,15 @@ class Shading(ABC):
         model = self.scaled(pixels)
         y, x = np.mgrid[:pixels[1], :pixels[0]]
         known = model.background(x, y) if background is None else np.asarray(background)
-        return ShadedGrid(model, np.asarray(model._prepared(x, y), dtype=np.float32), known.astype(np.float32))
+        return ShadedGrid(model, np.asarray(model.at_places(x, y), dtype=np.float32), known.astype(np.float32))
 
-    def _prepared(self, x_px, y_px):
-        """What depends on the place alone."""
+    def at_places(self, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
+        """What depends on the place alone, for `difference_at`: computed once for many slopes."""
         return np.zeros(np.shape(x_px))
 
     @abstractmethod
-    def _difference(self, slope_x, slope_y, prepared):
-        """Colour minus background, from what `_prepared` gave."""
+    def difference_at(self, slope_x: np.ndarray, slope_y: np.ndarray, prepared: np.ndarray) -> np.ndarray:
+        """Colour minus background (..., 3) at the places that `at_places` prepared."""
 
     def background(self, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """Colours (..., 3) of the untouched gel, smooth."""
@@ -158,7 +158,7 @@ class ShadedGrid:
 
     def colours(self, slope_x: np.ndarray, slope_y: np.ndarray) -> np.ndarray:
         """The image (row, column, 3) as uint8, of slopes (row, column)."""
-        found = self.background + self.shading._difference(slope_x, slope_y, self.prepared)
+        found = self.background + self.shading.difference_at(slope_x, slope_y, self.prepared)
         return np.clip(np.rint(found), 0, 255).astype(np.uint8)
 
 
@@ -195,11 +195,12 @@ class QuadraticShading(Shading):
     terms: np.ndarray = field(kw_only=True)
     """(tilt term, place term, 3); the tilt's terms start with the linear ones, so no tilt means no difference."""
 
-    def _prepared(self, x_px, y_px):
+    def at_places(self, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """Coefficients of the tilt's powers at some places, (tilt term, ..., 3)."""
         return np.stack([self._place_powers(x_px, y_px) @ term for term in self.terms])
 
-    def _difference(self, slope_x, slope_y, prepared):
+    def difference_at(self, slope_x: np.ndarray, slope_y: np.ndarray, prepared: np.ndarray) -> np.ndarray:
+        """See `Shading.difference_at`."""
         tilts = _tilt_powers(slope_x, slope_y, _degree_of(len(self.terms) + 1), like=prepared)
         total = tilts[0][..., None] * prepared[0]
         for tilt, coefficient in zip(tilts[1:], prepared[1:], strict=True):
@@ -233,9 +234,10 @@ class SlopeTable(QuadraticShading):
     counts: np.ndarray = field(kw_only=True)
     """(cell along y, cell along x) samples in a cell."""
 
-    def _difference(self, slope_x, slope_y, prepared):
+    def difference_at(self, slope_x: np.ndarray, slope_y: np.ndarray, prepared: np.ndarray) -> np.ndarray:
+        """See `Shading.difference_at`."""
         added = _between(self.table.astype(prepared.dtype), *_tilt(slope_x, slope_y))
-        return super()._difference(slope_x, slope_y, prepared) + added
+        return super().difference_at(slope_x, slope_y, prepared) + added
 
     @classmethod
     def fit(cls, samples: ShadingSamples, pixels: tuple[int, int], background: np.ndarray, **options: Any) -> Self:
@@ -270,7 +272,8 @@ class PhongShading(Shading):
     exponent: np.ndarray = field(kw_only=True)
     """(3,) of the gloss."""
 
-    def _difference(self, slope_x, slope_y, prepared):
+    def difference_at(self, slope_x: np.ndarray, slope_y: np.ndarray, prepared: np.ndarray) -> np.ndarray:
+        """See `Shading.difference_at`."""
         tilt_x, tilt_y = _tilt(*np.broadcast_arrays(slope_x, slope_y))
         lit = self._light(tilt_x, tilt_y) - self._light(np.zeros(()), np.zeros(()))
         return np.broadcast_to(lit, (*np.broadcast_shapes(np.shape(tilt_x), np.shape(prepared)), CHANNELS))
@@ -325,7 +328,7 @@ def slopes_of_colours(shading: Shading, colours: np.ndarray, x_px: np.ndarray, y
     """
     reach = steepest / np.hypot(1, steepest)
     wanted = np.asarray(colours, dtype=float) - background
-    best, width = np.zeros((len(wanted), 2)), reach
+    best, width, places = np.zeros((len(wanted), 2)), reach, shading.at_places(x_px, y_px)
     for count in [first] + [5] * rounds:
         steps = np.linspace(-width, width, count)
         tried = best[None] + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 1, 2)
@@ -333,7 +336,7 @@ def slopes_of_colours(shading: Shading, colours: np.ndarray, x_px: np.ndarray, y
         for tilt in tried:
             size = np.hypot(*tilt.T)
             slope = tilt / np.sqrt(1 - np.minimum(size, 0.99)**2)[:, None]
-            off = np.sum((shading.difference(slope[:, 0], slope[:, 1], x_px, y_px) - wanted)**2, axis=1)
+            off = np.sum((shading.difference_at(slope[:, 0], slope[:, 1], places) - wanted)**2, axis=1)
             better = (off < error) & (size <= reach * 1.0001)
             error[better], kept[better] = off[better], tilt[better]
         best, width = kept, steps[1] - steps[0]

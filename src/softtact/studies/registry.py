@@ -48,6 +48,8 @@ KINDS = {
                    "softtact.studies.decide.jobs:jobs"),
     "markers": Kind("softtact.studies.markers.config:read_values", "softtact.studies.markers.config:load_study",
                     "softtact.studies.markers.jobs:jobs"),
+    "real": Kind("softtact.studies.real.config:read_values", "softtact.studies.real.config:load_study",
+                 "softtact.studies.real.jobs:jobs"),
 }
 
 

@@ -1,8 +1,8 @@
 """A bonded layer whose surface is sheared under a round contact, and its sideways motion under a pressure: in-plane kernels.
 
 Symbols: G shear modulus, nu Poisson's ratio, h thickness, k wave number, x = k h, a contact radius, c radius that sticks.
-A wave of traction along its own direction (in plane) moves the surface by A(x) / (G k) times the traction, one across its direction by
-tanh(x) / (G k); a pressure p cos(k s) moves it along s by B(x) / (G k) p sin(k s). A and B follow from the solutions of Navier's
+A wave of traction along its own direction (in plane) moves the surface by A(x) / (G k) times the traction, one across its direction
+by tanh(x) / (G k); a pressure p cos(k s) moves it along s by B(x) / (G k) p sin(k s). A and B follow from the solutions of Navier's
 equations in a layer, exp(+-k z) and z exp(+-k z), with no displacement below.
 
 The traction of a ball that has stuck inside c and slid outside is Mindlin's difference of two Hertzian domes,
@@ -15,13 +15,14 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import j0, j1, jv
+from scipy.special import j0, j1
 
 from softtact.errors import InputError
 from softtact.models.elastic.ball_on_layer import BallOnLayer
 
 _DEEP = 20.0        # x beyond which the layer is a half-space, to 1e-15
 _WAVES = 200        # wave numbers up to there, and as many beyond
+_LOG_STEP, _SHARE_STEP = 0.15, 0.1      # of the grid of computed profiles
 _BEYOND = 60.0      # contact radii: wave number at which the tail ends
 
 
@@ -95,25 +96,48 @@ class ShearedContact:
     def motion(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
         """Motion (..., 2) of the surface along and across the shear, at places along and across it from the centre (...)."""
         radius, angle = np.hypot(along, across), np.arctan2(across, along)
-        grid = np.concatenate([[0.0], np.geomspace(0.02, 40, 160)]) * self.contact_radius
-        mean, turning = self._profiles(grid)
-        even, double = np.interp(radius, grid, mean / mean[0]), np.interp(radius, grid, turning / mean[0])
+        _, mean, turning = self._profiles()
+        even, double = (np.interp(radius, _ratios() * self.contact_radius, profile) for profile in (mean, turning))
         return np.stack([even + double * np.cos(2 * angle), double * np.sin(2 * angle)], axis=-1)
 
     @property
     def motion_per_force(self) -> float:
         """Sideways motion of the centre over the traction's force divided by G, 1 / length."""
-        mean, _ = self._profiles(np.zeros(1))
-        return float(mean[0] / (2 * np.pi * _dome_transform(np.array([1e-9]), self.contact_radius, self.stick_share)[0]))
+        return float(self._profiles()[0]) / self.thickness
 
-    def _profiles(self, radius):
-        """Parts that do not turn with the angle, and those that turn twice, at distances (r,)."""
-        x, weight, along, _ = surface_kernels(self.poisson, self.thickness, self.contact_radius)
-        waves, across = x / self.thickness, np.tanh(x)
-        spectrum = weight / self.thickness * _dome_transform(waves, self.contact_radius, self.stick_share)
-        mean = j0(np.outer(radius, waves)) @ (spectrum * 0.5 * (along + across))
-        turning = -jv(2, np.outer(radius, waves)) @ (spectrum * 0.5 * (along - across))
-        return mean, turning
+    def _profiles(self):
+        """Motion of the centre per force (times thickness), and the parts that do not turn and turn twice with the angle.
+
+        Linear between the nodes of a grid over log(a / h) and c / a, whose profiles are computed once.
+        """
+        place = np.log(self.contact_radius / self.thickness) / _LOG_STEP
+        share = self.stick_share / _SHARE_STEP
+        low, left = int(np.floor(place)), min(int(share), round(1 / _SHARE_STEP) - 1)
+        up, right = place - low, share - left
+        corners = ((low, left, (1 - up) * (1 - right)), (low, left + 1, (1 - up) * right), (low + 1, left, up * (1 - right)),
+                   (low + 1, left + 1, up * right))
+        parts = [[weight * part for part in _node(one, other, self.poisson)] for one, other, weight in corners]
+        return [sum(found) for found in zip(*parts, strict=True)]
+
+
+def _ratios():
+    """Distances over the contact radius."""
+    return np.concatenate([[0.0], np.geomspace(0.05, 40, 80)])
+
+
+@cache
+def _node(place, share_step, poisson):
+    """The profiles at a node of the grid; h = 1."""
+    contact, share = float(np.exp(place * _LOG_STEP)), share_step * _SHARE_STEP
+    x, weight, along, _ = surface_kernels(poisson, 1.0, contact)
+    across, spectrum = np.tanh(x), weight * _dome_transform(x, contact, share)
+    argument = np.outer(_ratios() * contact, x)
+    even, odd = j0(argument), j1(argument)
+    double = 2 * odd / np.maximum(argument, 1e-9) - even        # J2
+    double[0] = 0
+    mean, turning = even @ (spectrum * 0.5 * (along + across)), -double @ (spectrum * 0.5 * (along - across))
+    force = 2 * np.pi * _dome_transform(np.array([1e-9]), contact, share)[0]
+    return mean[0] / force, mean / mean[0], turning / mean[0]
 
 
 def _dome_transform(waves, a, share):

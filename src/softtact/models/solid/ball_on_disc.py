@@ -1,7 +1,7 @@
 """A rigid ball pressed into a round gel that is bonded to a rigid plate: finite strain, axisymmetric, from slipping to sticking.
 
-The force is proportional to the gel's modulus if Poisson's ratio and friction stay the same, so one path of unit modulus serves every
-modulus. x is the radius and y the axis; the gel's free surface is y = 0.
+The force is proportional to the gel's modulus if Poisson's ratio and friction stay the same, so one path of unit modulus serves
+every modulus. x is the radius and y the axis; the gel's free surface is y = 0.
 """
 
 from collections.abc import Callable, Sequence
@@ -88,11 +88,14 @@ class DiscPress:
 
 
 def press_disc(disc: Disc, depths_mm: Sequence[float], *, report: Callable[[float], None] = lambda share: None) -> DiscPress:
-    """The forces at rising depths; report: called with the share that is done. Raises ConvergenceError where a step is not reached."""
+    """The forces at rising depths.  report: called with the share that is done
+
+    Raises ConvergenceError where a step is not reached.
+    """
     depths = np.asarray(depths_mm, dtype=float)
     if not 0 < depths[0] or (np.diff(depths) <= 0).any() or depths[-1] >= 0.9 * disc.height_mm:
-        raise InputError(f"depths {', '.join(f'{one:g}' for one in depths)} mm: give rising numbers above 0 and below nine tenths of the "
-                         f"gel's height, {disc.height_mm:g} mm.")
+        raise InputError(f"depths {', '.join(f'{one:g}' for one in depths)} mm: give rising numbers above 0 and below nine tenths "
+                         f"of the gel's height, {disc.height_mm:g} mm.")
     ways = [{"y": -float(step)} for step in np.diff(np.concatenate([[0.0], depths]))]
     motion = Motion()
     for way in ways:
@@ -111,20 +114,20 @@ def press_disc(disc: Disc, depths_mm: Sequence[float], *, report: Callable[[floa
 
 def _body(disc: Disc) -> SolidBody:
     """Gel and ball; the ball is a strip of elements that a frame carries."""
-    width = _FINE * disc.ball_mm
+    width = min(_FINE * disc.ball_mm, 0.75 * disc.radius_mm)
     fine = int(np.ceil(width / disc.element_mm))
     lines = _growing(np.linspace(0, width, fine + 1), disc.radius_mm)
     levels = -_growing(np.array([0.0, disc.element_mm]), disc.height_mm)[::-1]
     gel = box((0, -disc.height_mm), (disc.radius_mm, 0), (len(lines) - 1, len(levels) - 1), geometry="axisymmetric",
               grading=(lines / disc.radius_mm, (levels + disc.height_mm) / disc.height_mm))
-    rim = 0.9 * disc.ball_mm
+    rim = min(0.9 * disc.ball_mm, 1.2 * disc.radius_mm)
 
     def to_ball(x):
         rise = disc.ball_mm - np.sqrt(disc.ball_mm**2 - x[:, 0]**2)
         return x + np.column_stack([0 * rise, rise, 0 * rise])
 
-    ball = box((0.0, 0.0), (rim, 0.1 * rim), (2 * int(np.ceil(rim / disc.element_mm)), 1), region="ball", geometry="axisymmetric").moved(
-        to_ball)
+    ball = box((0.0, 0.0), (rim, 0.1 * rim), (2 * int(np.ceil(rim / disc.element_mm)), 1), region="ball",
+               geometry="axisymmetric").moved(to_ball)
     mesh = gel.joined(ball, prefix="on ")
     law = make_law("neo_hooke", {"c10": 0.5}, bulk_over_shear=disc.bulk_over_shear)
     body = SolidBody(mesh, {"body": law, "on ball": law}, held={"x0": "x", "y0": "xy"},

@@ -1,0 +1,86 @@
+"""Verdicts of the study: our goals on measured data, judged on presses or points that were not fitted where there are any."""
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from softtact.evaluation.decisions import COLUMNS, UNDECIDED, below, mean_over_objects, row, verdict_of
+from softtact.studies.real.labelled import SMALL, WHEEL
+from softtact.studies.real.stages.force import ELASTIC
+from softtact.studies.real.stages.markers import FORMULAS, LAYER, PHYSICS, SPLINE
+
+DEPTH_ERROR, MARKERS_ERROR, SHEARED_ERROR = 0.05, 0.48, 0.25
+MADE = "made data: nothing was measured"
+
+
+def claims_of_real(tables: Mapping[str, pd.DataFrame], *, limits: Mapping[str, float | None], made: Mapping[str, bool],
+                   markers_made: bool, sheared: list[str]) -> pd.DataFrame:
+    """Data frame with `decisions.COLUMNS`.  limits: MAE in grey levels by set;  made: sets that the study drew itself"""
+    rows = [*_force(tables["gel_force"]), *_markers(tables["markers"], tables["other_markers"], markers_made, sheared)]
+    for name, limit in limits.items():
+        rows += _shading(name, tables["shading"], limit, made[name])
+    rows += [_size(name, own, made[name]) for name, own in tables["ball_size"].groupby("set", sort=False)]
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _force(table):
+    first = table.variant.iloc[0]
+    points = table.depth_mm.nunique()
+    for to, words in (("all", "One modulus gives the depth of every measured force"),
+                      ("one", "A modulus fitted to one measured force gives the depth of another")):
+        own = table[(table.variant == first) & ((table.fitted_to == "all") if to == "all" else ~table.fitted)]
+        worst = own.depth_error.abs().max()
+        layer = table[(table.variant == ELASTIC) & (table.fitted_to == "all")].depth_error.abs().max()
+        yield row(words, "force on a GelSight Mini", f"within {DEPTH_ERROR:.0%}",
+                  f"largest error {worst:.1%} ({'fitted' if to == 'all' else 'predicted'}); layer {layer:.1%}, fitted",
+                  verdict_of(bool(worst <= DEPTH_ERROR)), "depth at the measured force, first variant", "tables/gel_force.csv",
+                  uncertainty=f"{points} points; variants of contact and compressibility in the table")
+
+
+def _markers(table, others, made, sheared):
+    own = table[table.camera == "shift"].set_index("model").components
+    spline = table[table.model == SPLINE].components.iloc[0]
+    ours = f"{own[PHYSICS]:.3f}; formulas {own[FORMULAS]:.3f}, linear layer {own[LAYER]:.3f}, spline left out {spline:.3f}"
+    yield row("The motion of markers under a ball is explained to the tracking's noise", "FOTS, marker image",
+              f"at most {MARKERS_ERROR:g}",
+              MADE if made else ours, UNDECIDED if made else verdict_of(bool(own[PHYSICS] <= MARKERS_ERROR)),
+              "sum |predicted - measured| / sum |measured|; camera's shift and parameters fitted to this image",
+              "tables/markers.csv", uncertainty="one image, motion in whole px")
+    for name, rows in others[others.camera == "shift"].groupby("image", sort=False):
+        error, limit = rows.set_index("model").components, SHEARED_ERROR if name in sheared else MARKERS_ERROR
+        yield row(f"The gel found on the first image explains {name}", "marker image", f"at most {limit:g}",
+                  f"{error[PHYSICS]:.3f}; formulas {error[FORMULAS]:.3f}, linear layer {error[LAYER]:.3f}",
+                  UNDECIDED if made else verdict_of(bool(error[PHYSICS] <= limit)),
+                  "place, depth, motion aside and camera's shift fitted", "tables/other_markers.csv", uncertainty="one image")
+
+
+def _shading(name, table, limit, made):
+    own = table[(table.set == name)]
+
+    def per_press(model, circles):
+        return own[(own.model == model) & (own.circles == circles)].groupby("press").mae.mean()
+
+    for circles in ("labelled", "found"):
+        best = per_press("table", circles)
+        beside = {model: per_press(model, circles).mean() for model in (SMALL, "phong", WHEEL) if (own.model == model).any()}
+        estimate = mean_over_objects(best)
+        others = ", ".join(f"{model} {value:.2f}" for model, value in beside.items())
+        verdict = UNDECIDED if made or limit is None else below(estimate, limit)
+        yield row(f"The table predicts the colours of held-out presses of {name}, {circles} circles", "shading",
+                  "no limit" if limit is None else f"at most {limit:g} grey levels",
+                  MADE if made else f"MAE {estimate.mean:.2f}; {others}", verdict,
+                  "mean absolute error in the labelled circle", "tables/shading.csv", uncertainty=estimate.in_words(".2f"))
+
+
+def _size(name, own, made):
+    """The ball's size is found if the interval of some model's best size is inside the range that was searched."""
+    words = []
+    inside = False
+    for model, rows in own.groupby("model", sort=False):
+        one = rows.iloc[0]
+        words.append(f"{model} {one.best_px:.0f} px ({one.best_low_px:.0f} to {one.best_high_px:.0f})")
+        inside |= bool(rows.ball_px.min() < one.best_low_px and one.best_high_px < rows.ball_px.max())
+    return row(f"The ball's size of {name} follows from its colours", "shading", "not stated",
+               MADE if made else "; ".join(words), UNDECIDED if made or not inside else verdict_of(True),
+               "the 95 % interval of the best size lies inside the range searched", "tables/ball_size.csv",
+               uncertainty="presses drawn with replacement")

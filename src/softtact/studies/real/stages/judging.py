@@ -1,0 +1,62 @@
+"""The verdicts, and the page of the study."""
+
+from typing import Any
+
+import pandas as pd
+
+from softtact.files import read_json, write_csv
+from softtact.reporting.page import Page
+from softtact.studies.real.claims import claims_of_real
+
+_CAPTIONS = {
+    "gel_force": "Left: force of a ball on the gel, each variant with the one modulus that is best for all fitted points "
+                 "(crosses). Right: error of the depth at the measured forces.",
+    "markers": "Motion of the markers under a ball, measured and by the models, each fitted to this image with the camera's shift.",
+    "shading": "A press of each set that was held out, with its circle as labelled: measured and by each model. Circles were "
+               "found from the colours.",
+    "ball_size": "Error of the colours over the assumed radius of the ball: presses held out, in and around the contact; the "
+                 "wheel's table, which has seen all presses, in the contact.",
+}
+
+
+def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the table of claims.  inputs: the tables (CSV);  outputs: claims;  settings: limits, made, markers_made, sheared"""
+    tables = {name: pd.read_csv(path) for name, path in inputs.items()}
+    write_csv(outputs["claims"], claims_of_real(tables, **settings))
+
+
+def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the page.  inputs: the tables, claims (CSV), figures, facts (lists), gel (JSON);  outputs: page;
+    settings: study, names (of the figures), config
+    """
+    tables = {name: pd.read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items()
+              if name not in ("figures", "facts", "gel")}
+    facts, gel = [read_json(path) for path in inputs["facts"]], read_json(inputs["gel"])
+    page = Page("Gels with a camera on measured data", settings["study"], folder=outputs["page"].parent)
+    page.box("What is measured, what is fitted.", [
+        *(f"Presses: {one['presses']} of {one['source']}{'' if one['measured'] else ' - synthetic, no measurement'}."
+          for one in facts),
+        "Force: moduli are fitted to the points that each row of the table names; all else is predicted.",
+        f"Markers: the gel (path {gel['path']}, distance {gel['distance_px']:.0f} px) is fitted to the first image; in other "
+        "images only the ball's place, depth and motion and the camera's shift are.",
+        "Shading: fitted to presses that are not among those of the scores; circles `found` use the held-out image itself to find "
+        "where the ball is, circles `labelled` do not."])
+    page.claims(tables["claims"], title="Claims", file=inputs["claims"])
+    page.section("Figures")
+    page.figures((path, _CAPTIONS[name]) for path, name in zip(inputs["figures"], settings["names"], strict=True))
+    page.section("Tables")
+    page.table(tables["gel_force"][tables["gel_force"].fitted_to == "all"], "One modulus for all points", file=inputs["gel_force"])
+    page.table(tables["markers"], "Markers, first image", file=inputs["markers"])
+    if len(tables["other_markers"]):
+        page.table(tables["other_markers"], "Markers, other images", file=inputs["other_markers"])
+    page.table(mean_scores(tables["shading"]), "Shading, mean over held-out presses", file=inputs["shading"])
+    page.table(tables["ball_size"].drop_duplicates(["set", "model"]), "Size of the ball", file=inputs["ball_size"])
+    page.section("Configuration")
+    page.code(settings["config"])
+    page.write(outputs["page"])
+
+
+def mean_scores(table: pd.DataFrame) -> pd.DataFrame:
+    """A row for each set, kind of circles and model: means over presses and seeds."""
+    names = ["mae", "mse", "ssim", "psnr_db", "normal_deg", "normal_median_deg"]
+    return table.groupby(["set", "circles", "model"], sort=False)[names].mean().reset_index()
