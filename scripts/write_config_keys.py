@@ -31,8 +31,8 @@ Written by `scripts/write_config_keys.py` from the models that check them; edit 
 
 A file of this folder is one study: `snakemake --cores all --configfile config/NAME.yaml`. `study` names its folder below
 `results/`, `kind` says which kind it is (without it: hybrid). What a study of kind hybrid, grasps, decide, markers or real does not
-state is as in `config.yaml`, `grasps.yaml`, `decide.yaml`, `markers.yaml` or `real.yaml`. A value that is not printed in a paper may be written
-`{value: ..., assumed: true, reason: ...}`.
+state is as in `config.yaml`, `grasps.yaml`, `decide.yaml`, `markers.yaml` or `real.yaml`. A value that is not printed in a paper
+may be written `{value: ..., assumed: true, reason: ...}`.
 `objects/` holds the meshes and their catalogue, `costs.yaml` the times that `softtact cost` tells.
 """
 

@@ -28,8 +28,8 @@ def small_press():
     layers = [BallOnLayer(one, 0.8, 1.0, 0.475) for one in contacts]
     rows = [np.zeros((1, 120)), *([one.lowering(radii)] for one in layers)]
     out = [np.zeros((1, 120)), *([outward(one, radii)] for one in layers)]
-    return DiscPress(np.array([0, *(one.depth for one in layers)]), np.array([0, *(one.force_over_shear_modulus for one in layers)]),
-                     radii, np.vstack(out), np.vstack(rows))
+    depth, force = [0, *(one.depth for one in layers)], [0, *(one.force_over_shear_modulus for one in layers)]
+    return DiscPress(np.array(depth), np.array(force), radii, np.vstack(out), np.vstack(rows))
 
 
 GEL = MarkerGel(small_press(), ball_px=94.0, ball_over_thickness=0.8, friction=0.5, distance_px=450.0, poisson=0.475)

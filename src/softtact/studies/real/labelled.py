@@ -24,6 +24,7 @@ REACH = 1.5             # contact radii: how far from the centre pixels are fitt
 WHEEL = "the wheel's table"
 SMALL = "quadratic in tilt"
 _PIXELS = 40_000        # samples of a fit, about
+_LARGEST = 0.985        # of a contact's radius over the ball's
 _BINS = 125             # of the wheel's table, along each axis
 _NORMALS = 250          # pixels of a press whose normal is recovered, about
 
@@ -88,7 +89,7 @@ def circles_found(own: LabelledSet, numbers: Sequence[int], gel: Gel, options: d
     Circles and shading are fitted in turn; pixels within REACH labelled radii take part.
     """
     labelled = [clipped(own.presses[number], gel) for number in numbers]
-    found, step = labelled, max(2, round(own.largest_px / 12))
+    found, step = labelled, max(2, round(own.largest_px / 9))
     shading = fitted("polynomial", own, found, gel, options, reach=[REACH] * len(found))
     for _ in range(rounds):
         found = [refined_circle(one, gel, shading, reach=REACH * label.radius_px / one.radius_px, step=step,
@@ -101,7 +102,7 @@ def circles_found(own: LabelledSet, numbers: Sequence[int], gel: Gel, options: d
 def found_again(press: BallPress, own: LabelledSet, gel: Gel, shading: Shading) -> BallPress:
     """A press that was held out, with its circle found by a shading that has not seen it."""
     label = clipped(press, gel)
-    step = max(2, round(own.largest_px / 12))
+    step = max(2, round(own.largest_px / 9))
     first = refined_circle(label, gel, shading, reach=REACH, step=step, most_px=0.5 * label.radius_px)
     return refined_circle(first, gel, shading, reach=REACH * label.radius_px / first.radius_px, step=step,
                           most_px=0.5 * label.radius_px)
@@ -109,7 +110,7 @@ def found_again(press: BallPress, own: LabelledSet, gel: Gel, shading: Shading) 
 
 def clipped(press: BallPress, gel: Gel) -> BallPress:
     """The press with a circle that is not larger than the ball allows."""
-    return replace(press, radius_px=min(press.radius_px, 0.95 * gel.ball_px))
+    return replace(press, radius_px=min(press.radius_px, _LARGEST * gel.ball_px))
 
 
 def drawn(model: Shading | np.ndarray, press: BallPress, gel: Gel, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ def _ball_sizes(own: LabelledSet, one: dict[str, Any], values: dict[str, Any], o
     sizes = [ratio * own.largest_px for ratio in values["ball_ratios"]]
     for ball in sizes:
         gel = Gel(ball, one["thickness_px"])
-        found, finder = circles_found(own, fit, gel, options, values["rounds"])
+        found, finder = circles_found(own, fit, gel, options, 1)
         again = [found_again(own.presses[number], own, gel, finder) for number in held]
         reach = {name: [REACH * clipped(own.presses[number], gel).radius_px / press.radius_px
                         for number, press in zip(numbers, presses, strict=True)]
