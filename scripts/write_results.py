@@ -45,7 +45,8 @@ FIGURES = {
     "fig5_ftir": "Figure 5. Contact area of the dielectric on glass.",
     "fig6_ssim": "Figure 6. SSIM of each item, with the marks of predictors that need no network.",
     "fig7_maps": "Figure 7. Deformation maps of both models, and tactile maps predicted and felt by the virtual sensor.",
-    "fig8_policies": "Figure 8. What each policy of choosing a model costs, and which error it accepts.",
+    "fig8_policies": "Figure 8. What each policy of choosing a model costs, and which error it accepts against the study's own "
+                     "hyperelastic model, which has 0 by definition; the error of its mesh is stated above.",
     "fig9_networks": "Figure 9. The printed network beside another, on the same split.",
     "fig10_learning_curve": "Figure 10. SSIM against the number of training maps."}
 # Title, file below the run's folder, and the columns that the page shows; all columns stand in the CSV beside it.
