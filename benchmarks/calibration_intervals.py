@@ -29,6 +29,7 @@ from softtact.calibration.experiment import experiment
 from softtact.calibration.fit import calibrate
 from softtact.calibration.ladder import Presses
 from softtact.calibration.problem import Problem
+from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.mesh_settings import PRESETS
 from softtact.sensors.base import read_mapping
 from softtact.sensors.library import sensor_file
@@ -93,12 +94,14 @@ def row_of(seed, found, kinds, seconds):
 
 def summary_of(rows):
     """{kind: share within 1.96 deviations, root mean square over the deviation}, and of all kinds with equal weights."""
-    kinds = {}
+    kinds, refused = {}, sum("refused" in row for row in rows)
+    rows = [row for row in rows if "refused" not in row]
     for kind in ("modulus scale", "gain", "zero", "place"):
         ratios = np.concatenate([row[kind]["over_deviation"] for row in rows])
         kinds[kind] = {"within_95": round(float((np.abs(ratios) <= NORMAL_95).mean()), 4),
                        "mean": round(float(ratios.mean()), 3), "rms": round(float(np.sqrt((ratios**2).mean())), 3)}
-    return kinds | {"specimens": len(rows), "within_95": round(float(np.mean([kinds[kind]["within_95"] for kind in kinds])), 4)}
+    return kinds | {"specimens": len(rows), "refused": refused,
+                    "within_95": round(float(np.mean([kinds[kind]["within_95"] for kind in kinds])), 4)}
 
 
 def main(specimens=SPECIMENS):
@@ -106,8 +109,11 @@ def main(specimens=SPECIMENS):
     sensor, rows = small_sensor(), json.loads(ROWS.read_text()) if ROWS.exists() else []
     for seed in sorted(set(range(specimens)) - {row["seed"] for row in rows}):
         start = time.process_time()
-        hidden, places, found = calibrated(sensor, seed)
-        rows.append(row_of(seed, found, errors(sensor, hidden, places, found), time.process_time() - start))
+        try:
+            hidden, places, found = calibrated(sensor, seed)
+            rows.append(row_of(seed, found, errors(sensor, hidden, places, found), time.process_time() - start))
+        except ConvergenceError as error:     # such a calibration states nothing
+            rows.append({"seed": seed, "refused": str(error)})
         ROWS.write_text(json.dumps(rows))
         print(json.dumps({name: value for name, value in rows[-1].items() if not isinstance(value, dict)}), flush=True)
     summary = {"all": summary_of(rows), "not chosen on": summary_of([row for row in rows if row["seed"] >= CHOSEN_ON] or rows)}
