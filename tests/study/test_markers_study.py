@@ -187,19 +187,19 @@ def verdicts_of(rows, sliding=None):
 
 def test_scores_in_the_papers_order_reproduce_its_order():
     found = verdicts_of(made_up_scores(IN_ORDER))
-    assert found["The proposed network has a smaller d than the 3D-UNet without LSTM"] == REPRODUCED
+    assert found["The d of the proposed network is smaller than that of the 3D-UNet without LSTM"] == REPRODUCED
     assert found["The proposed network has the smallest d at every deformation"] == REPRODUCED
 
 
 def test_scores_in_another_order_do_not():
     found = verdicts_of(made_up_scores(IN_ORDER | {"proposed": 170}))
-    assert found["The proposed network has a smaller d than the 3D-UNet without LSTM"] == NOT
+    assert found["The d of the proposed network is smaller than that of the 3D-UNet without LSTM"] == NOT
     assert found["The proposed network has the smallest d at every deformation"] == NOT
 
 
 def test_scores_of_few_objects_decide_nothing():
     found = verdicts_of(made_up_scores(IN_ORDER, objects=("cone", "cross", "line")))
-    assert found["The proposed network has a smaller d than the 3D-UNet without LSTM"] == UNDECIDED
+    assert found["The d of the proposed network is smaller than that of the 3D-UNet without LSTM"] == UNDECIDED
 
 
 def test_networks_whose_images_all_lack_a_marker_decide_nothing():
@@ -219,7 +219,7 @@ def test_a_threshold_between_both_states_tells_all_but_the_small_object():
     judged = sliding_verdicts(made_up_sliding(), ["cross", "cylinder"])
     assert judged.threshold_px.unique() == pytest.approx([10.0])     # between 0.5 and 200 on a logarithmic scale
     assert wrong_objects(judged, "physics") == ["cone"]
-    name = "By the change of the summed motion the solved images tells fixed from free objects, all but cone and tetrahedron"
+    name = "The change of the summed motion tells fixed from free objects, all but cone and tetrahedron: the solved images"
     assert verdicts_of(made_up_scores(IN_ORDER))[name] == REPRODUCED
     assert verdicts_of(made_up_scores(IN_ORDER), made_up_sliding(("S",)))[name] == NOT
 

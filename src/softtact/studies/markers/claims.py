@@ -175,10 +175,10 @@ WORDS = {
 def _orders(rows: pd.DataFrame) -> Iterator[dict[str, str]]:
     for name, words, unit, worse, better, where, paper in _ORDERS:
         gap, means = _gap(rows, name, worse, better), _by_object(rows, name).mean()
-        claim = f"{WORDS[better]} has a smaller {words} than {WORDS[worse]}"
+        claim = f"The {words} of {WORDS[better]} is smaller than that of {WORDS[worse]}"
         ours = "not run" if not gap.objects else f"{means[worse]:.4g} and {means[better]:.4g} {unit}".strip() + f" {_OURS}"
         yield row(
-            claim[0].upper() + claim[1:], where, paper, ours, above(gap, 0.0), RULE, _SCORES, uncertainty=gap.in_words("+.3g")
+            claim, where, paper, ours, above(gap, 0.0), RULE, _SCORES, uncertainty=gap.in_words("+.3g")
         )
 
 
@@ -253,7 +253,7 @@ def _levels(rows: pd.DataFrame) -> dict[str, str]:
 def _sliding(verdicts: pd.DataFrame) -> Iterator[dict[str, str]]:
     rule = "no object but these two is told wrongly; of all sixteen, else undecided"
     for source in ("proposed", "physics"):
-        claim = f"By the change of the summed motion {WORDS[source]} tells fixed from free objects, all but cone and tetrahedron"
+        claim = f"The change of the summed motion tells fixed from free objects, all but cone and tetrahedron: {WORDS[source]}"
         if source not in set(verdicts.source):
             yield row(claim, "sec. V-C", "cone and tetrahedron wrong", "not run", UNDECIDED, rule, _SLIDING)
             continue

@@ -106,6 +106,7 @@ class _Jobs:
             {"manifest": f"{self.folder}/dataset/manifest.csv", "facts": f"{self.folder}/facts/data.json"},
             {
                 "path": self.values.path.model_dump(mode="json"),
+                "objects": len(self.study.objects),
                 "generated": [name for name in self.study.objects if self.study.mesh_file(name) is None],
             },
         )

@@ -105,7 +105,7 @@ def list_data(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     """List the sequences of the data set, and state its size.
 
     inputs: sequences (list);  outputs: manifest (CSV, a row for each sequence), facts (JSON)
-    settings: path, generated (names of generated objects)
+    settings: path, generated (names of generated objects), objects (number)
     """
     rows, facts = [], []
     for file in inputs["sequences"]:
@@ -136,6 +136,7 @@ def list_data(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
             "largest_force_n": max(one["largest_force_n"] for one in facts),
             "largest_marker_motion_px": max(one["largest_marker_motion_px"] for one in facts),
             "generated": settings["generated"],
+            "objects": settings["objects"],
         },
     )
 

@@ -64,7 +64,9 @@ def _beside(table: pd.DataFrame, printed: Mapping[str, tuple[float, ...]], names
             for source, values in printed.items()
         ]
     )
-    return table.merge(known, on="source", how="outer", sort=False)
+    joined = table.merge(known, on="source", how="outer")
+    only_printed = [source for source in printed if source not in set(table.source)]
+    return joined.set_index("source").loc[[*table.source, *only_printed]].reset_index()
 
 
 def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -90,9 +92,9 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
         page.text(sentence)
     page.section("Tables I and II")
     page.text(
-        "Means over the scored frames; _sd: standard deviation over trainings from several seeds. d and e are of images in which "
-        "every marker was found. `physics`: the solved images, their markers found by the same detector, which is the floor of "
-        "all d. printed: the paper's, on its real images."
+        "Means over the scored frames. d and error vectors are of images in which every marker was found. The solved images are "
+        "those that the networks learn, their markers found by the same detector: the floor of all d. Printed: the paper's "
+        "numbers, on its real images."
     )
     for name, title in (
         ("table1", "Table I: markers"),
@@ -111,19 +113,29 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.write(outputs["page"])
 
 
+_HEADS = {"d_px": "d, px", "e_px": "error vector magnitude, px", "degenerate_percent": "degenerate images, %", "mae": "MAE",
+          "mse": "MSE", "ssim": "SSIM", "psnr": "PSNR, dB"}
+
+
 def _worded(table: pd.DataFrame) -> pd.DataFrame:
-    return table.assign(source=table.source.map(lambda name: WORDS.get(name, name))) if "source" in table else table
+    """A table with sources and columns in words; a column without any number, such as a spread over one seed, is left out."""
+    heads = {}
+    for name, head in _HEADS.items():
+        heads |= {name: head, f"{name}_sd": f"{head}, sd over seeds", f"printed_{name}": f"printed: {head}"}
+    if "source" in table:
+        table = table.assign(source=table.source.map(lambda name: WORDS.get(name, name)))
+    return table.dropna(axis=1, how="all").rename(columns=heads | {"source": "images or markers of"})
 
 
 def _facts(facts: dict[str, Any], settings: dict[str, Any]) -> list[str]:
     made = facts["generated"]
     objects = (
         "All objects are generated after the sizes of the paper's files."
-        if len(made) >= 16
+        if len(made) == facts["objects"]
         else f"Generated, the others being the authors' files: {', '.join(made)}."
     )
     return [
-        f"{facts['sequences']} sequences of {facts['frames']:,} frames were pressed, {facts['share_of_printed_pairs']:.1%} of the "
+        f"{facts['sequences']} sequences of {facts['frames']:,} frames were pressed, {facts['share_of_printed_pairs']:.2%} of the "
         f"paper's 317,520 pairs; networks are {settings['size']}, images {settings['pixels']} px. The largest force is "
         f"{facts['largest_force_n']:.3g} N, the largest motion of a marker {facts['largest_marker_motion_px']:.3g} px of the "
         "camera's image.",
