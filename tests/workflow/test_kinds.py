@@ -39,7 +39,7 @@ CASES = [
     Case("skin", "config/tiny_skin.yaml", ("draws: 200", "draws: 201"), "skin/maps.py", "read_taxels"),
     Case("decide", "config/tiny_decide.yaml", ("epochs: 3", "epochs: 4"), "readout/virtual_sensor.py", "press"),
     Case("markers", "config/tiny_markers.yaml", ("epochs: 4", "epochs: 5"), "learning/image_training.py", "press_object"),
-    Case("palpation", "config/tiny_probe.yaml", ("variant_steps: 3", "variant_steps: 4"), "probe/lump.py", "sweep"),
+    Case("palpation", "config/tiny_probe.yaml", ("variant_steps: 3", "variant_steps: 4"), "probe/structure.py", "sweep"),
 ]
 # The stages that these changes rerun, by hand; those of the other kinds follow from their list of jobs.
 GRASPED = {"grasp", "read_grasp", "tabulate_grasps", "draw_grasped_objects", "report"}
