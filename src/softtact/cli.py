@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import softtact
 from softtact.commands import (
     calibrate,
+    calibrate_camera,
     completion,
     cost,
     dataset,
@@ -32,7 +33,7 @@ from softtact.commands import (
 from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError, missing_extra
 
-COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, fit, mesh, export_deck,
+COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, calibrate_camera, predict, fit, mesh, export_deck,
             detect_discs, cost, stage, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png

@@ -152,7 +152,8 @@ def _digest(path):
 
 def _pictures(options, data, scene, record):
     """Draw the pictures; return their paths."""
-    from softtact.robot.render import WHOLE, draw_grasp, draw_rows, write_video
+    from softtact.imaging.movies import write_movie
+    from softtact.robot.render import WHOLE, draw_grasp, draw_rows
 
     written = []
     if options.picture:
@@ -164,7 +165,7 @@ def _pictures(options, data, scene, record):
         images = draw_rows(scene, record, rows, view=WHOLE)
         if images is not None:
             written.append(options.out / "grasp.mp4")
-            write_video(written[-1], images, fps=0.25 / scene.settings.record_s)
+            write_movie(written[-1], images, fps=0.25 / scene.settings.record_s)
     return written
 
 

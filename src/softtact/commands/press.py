@@ -23,6 +23,7 @@ from softtact.commands.common import (
     show,
 )
 from softtact.commands.press_each import ON_LAYERS, ON_SOLIDS, Files, is_several, press_each
+from softtact.commands.press_gel import add_images, check_images, gel_lines, is_image, summary_of_gel, write_images
 from softtact.errors import ConvergenceError, InputError
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ EXAMPLES = """
   softtact press tomato.stl --unit mm --force 10 --object-law card.json --object-size 2.5
   softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
   softtact press ball.stl --unit mm --force 5 --sensor dome.yaml --out press.nc     # a sensor of kind solid
+  softtact press part.stl --unit mm --sensor gelsight_mini --motion "z -1.0 in 5; x 1.0 in 5" --image out.png --movie out.mp4
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic", "solid")
 _HELD = 0.3     # default share of a soft object's height that is held
@@ -79,6 +81,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="write the pressed sensor for ParaView and softtact view: the hyperelastic model's whole mesh, the "
                               "others' surface")
     command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels (PNG or SVG)")
+    add_images(command)
     command.add_argument("--full-scale", action="store_true",
                          help="let the taxels' colours in --plot end at the readout's largest count, not at the data's")
 
@@ -99,22 +102,24 @@ def _press(options):
     spec, pose = any_sensor_spec(options.sensor), pose_of(options)
     _refuse_idle(options, spec)
     _check_soft(options, spec)
+    check_images(options, spec)
     if options.time_limit is not None and not options.time_limit > 0:
         raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
     how = _how(options, spec)
     several = is_several(options.mesh)
     if not several:
-        check_folders(options.out, options.vtu, options.plot)
+        check_folders(options.out, options.vtu, options.plot, options.image, options.movie)
     cards = [path for _, path in pairs("--card", options.card)] + ([options.object_law] if options.object_law else [])
     refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards, *spec.paths],
-                       {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
+                       {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot, "--image": options.image,
+                        "--movie": options.movie})
     check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     if not several:
         check_names({options.out: (".nc",)})
     press = partial(_press_one, options=options, spec=spec, pose=pose, how=how, sensors=[])
     if several:
         return press_each(options, press, ON_LAYERS if spec.has_layers else ON_SOLIDS)
-    summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot))
+    summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot, options.image, options.movie))
     show(summary, as_json=options.json, lines=_lines_on_layers(summary) if spec.has_layers else _lines_on_solids(summary))
     if error:
         raise error
@@ -147,7 +152,7 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
         if getattr(stop, "result", None) is None:
             raise
         result, error = stop.result, stop
-    return _written(result, files, options), error
+    return _written(result, files, options, sensor), error
 
 
 # Options with an effect only on the hyperelastic model, on laws (which the elastic model has none of), or on the choice.
@@ -233,7 +238,7 @@ def _quality(options):
     return {"mesh": mesh(), "solver": solver()}
 
 
-def _written(result, files, options):
+def _written(result, files, options, sensor):
     """Write the files of a press, also of one that stopped at a load step; return its summary."""
     if files.out:
         result.write(files.out)
@@ -241,13 +246,15 @@ def _written(result, files, options):
         result.write_vtu(files.vtu)
     if files.plot:
         result.plot(files.plot, full_scale=options.full_scale)
+    write_images(result, sensor, files.image, files.movie)
     if options.card and result.model == "elastic":
         print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
               "name another model to use it.", file=sys.stderr)
     summary = _summary_on_layers(result) if result.deformation_map_mm is not None else _summary_on_solids(result)
-    others = {name: _or_none(reading.values) for name, reading in result.readings.items() if name not in ("taxels", "points")}
+    others = {name: _or_none(reading.values) for name, reading in result.readings.items()
+              if name not in ("taxels", "points") and not is_image(reading)}
     facts = {"repairs": [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair], "readings": others}
-    return summary | facts | {"written": [str(path) for path in (files.out, files.vtu, files.plot) if path]}
+    return summary | facts | summary_of_gel(result) | {"written": [str(path) for path in files.all if path]}
 
 
 def _cards(options, spec):
@@ -305,11 +312,15 @@ def _lines_on_layers(summary):
     yield f"model: {summary['model']}, linear solver: {summary['solver']}"
     if summary["selection_reason"]:
         yield f"chosen because: {summary['selection_reason']}"
+    if "tactile_map" not in summary:
+        yield from gel_lines(summary)
+        yield from _quality_lines(summary)
+        return
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
     names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm")
-    counts = [f"{sum(map(sum, one)):14.0f}" for one in summary.get("tactile_map", [])] or ["-".rjust(14)] * len(summary["force_n"])
+    counts = (sum(map(sum, one)) for one in summary["tactile_map"])
     for force, depth, area, deepest, total in zip(*(summary[name] for name in names), counts, strict=True):
-        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{total}"
+        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{total:14.0f}"
     yield from _quality_lines(summary)
 
 

@@ -11,6 +11,7 @@ from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.progress import announce
 
 MESHES = (".stl", ".obj", ".ply")
+_PICTURES = ("vtu", "plot", "image", "movie")      # options that name a file in each object's folder
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,13 @@ class Files:
     out: Path | None
     vtu: Path | None
     plot: Path | None
+    image: Path | None = None
+    movie: Path | None = None
+
+    @property
+    def all(self) -> tuple[Path | None, ...]:
+        """All of them; None for one that was not asked for."""
+        return self.out, self.vtu, self.plot, self.image, self.movie
 
 
 def is_several(meshes: Sequence[Path]) -> bool:
@@ -115,7 +123,7 @@ def _folder(options):
     if options.out.suffix.lower() == ".nc" or options.out.is_file():
         raise InputError(f"--out {options.out}: each of several objects gets a folder of results; give --out a folder for them.")
     check_folders(options.out)
-    for name in ("vtu", "plot"):
+    for name in _PICTURES:
         path = getattr(options, name)
         if path and path.parent != Path("."):
             raise InputError(f"--{name} {path}: each of several objects gets one in its folder; give a name without a folder.")
@@ -124,8 +132,8 @@ def _folder(options):
 
 def _row(name, path, folder, options, press, columns):
     """Press an object and write its files; return its row of the table, and its error or None."""
-    files = Files(folder / "press.nc", *(given and folder / given for given in (options.vtu, options.plot)))
-    for old in (files.out, files.vtu, files.plot):
+    files = Files(folder / "press.nc", *(given and folder / given for given in (getattr(options, name) for name in _PICTURES)))
+    for old in files.all:
         if old:
             old.unlink(missing_ok=True)     # of an earlier run, so that they are not mistaken for new ones
     try:

@@ -7,8 +7,9 @@ A pixel's ray meets the surface at a point X of the surface at rest with
 which fixed-point iteration solves. The slope there is that of the moved surface, F^-T grad z with F = I + grad u, along the image's
 axes. A shading model gives its colour; markers are discs that lie on the surface and deform with it.
 
-Compiled loops over pixels look a shading up in a table. The table is exact in the place, as the shadings are polynomials of a low
-degree there, and bilinear over the tilt. `colours_by_formula` is the slow twin of that loop.
+Rays are followed at about as many pixels as the map has points, and colours are linear between them. Compiled loops look a shading
+up in a table, which is exact in the place, as the shadings are polynomials of a low degree there, and bilinear over the tilt.
+`colours_by_formula` at all pixels is the slow twin of these loops.
 """
 
 import functools
@@ -26,7 +27,6 @@ _DEGREES = (0, 1, 2, 3)   # of the shading in the place, tried in turn
 _EXACT = 0.02             # grey levels: largest error of the table in the place
 _PASSES = 12              # of the search for a ray's point
 _CLOSE = 0.005            # of a cell of the map: change at which the search ends
-_UNSEEN = 0.25            # grey levels: smaller differences from a flat surface are not looked up
 _LEAST_STRETCH = 0.1      # of the surface: a model's ratio of areas below it is not to be inverted
 
 
@@ -124,8 +124,6 @@ class ShadingTable:
     """(tilt along y, tilt along x, monomial, channel), grey levels; a fourth channel fills the line and is not read."""
     degree: int
     """Of the monomials."""
-    flat: float
-    """Tilt below which the colour differs from that of a flat surface by less than a quarter of a grey level."""
     middle: np.ndarray
     """(2,) px: the place's origin."""
     unit: float
@@ -151,9 +149,8 @@ def tabulate(shading: Shades, camera: Pinhole) -> ShadingTable | None:
             *few, np.full(len(few[0]), middle[0] + unit * x), np.full(len(few[0]), middle[1] + unit * y))).max()
             for x, y in ((0.71, -0.33), (-0.88, 0.52), (0.13, 0.94))]
         if max(errors) < _EXACT:
-            values = np.pad(terms(slope_x, slope_y), [(0, 0), (0, 0), (0, 0), (0, 1)]).astype(np.float32)
-            steepest = max(np.abs(np.diff(values, axis=axis)).sum(axis=2).max() for axis in (0, 1)) / (tilts[1] - tilts[0])
-            return ShadingTable(values, degree, _UNSEEN / max(steepest, 1.0), middle, unit)
+            values = np.pad(terms(slope_x, slope_y), [(0, 0), (0, 0), (0, 0), (0, 1)])
+            return ShadingTable(values.astype(np.float32), degree, middle, unit)
     return None
 
 
@@ -164,8 +161,9 @@ def colours_by_table(slopes: np.ndarray, step: int, table: ShadingTable, backgro
     """
     image = np.empty((*light.shape, 3), dtype=np.uint8)
     tilts = (slopes / np.sqrt(1 + (slopes**2).sum(axis=2, keepdims=True))).astype(np.float32)
-    _colour(tilts, step, table.values, table.degree, table.flat, table.middle, 1 / table.unit,
-            background, light, image)
+    difference = np.empty((*tilts.shape[:2], 4), dtype=np.float32)
+    _look_up(tilts, step, table.values, table.degree, table.middle, 1 / table.unit, difference)
+    _colour(difference, step, background, light, image)
     return image
 
 
@@ -299,43 +297,47 @@ def _see(rays, moved, fields, grid, distance, steep, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
-def _colour(tilts, step, table, degree, flat, middle, over_unit, background, light, image):
-    """Look the colours up row by row; tilts are linear between each `step`-th pixel."""
-    size, count, over_step = table.shape[0], table.shape[2], np.float32(1 / step)
-    scale, half = np.float32(0.5 * (size - 1) / _STEEPEST), np.float32(0.5 * (size - 1))
-    place, value, line = np.empty(count, dtype=np.float32), np.empty(4, dtype=np.float32), np.zeros((tilts.shape[1], 4), np.float32)
-    one, zero = np.float32(1), np.float32(0)
+def _look_up(tilts, step, table, degree, middle, over_unit, out):
+    """Colours minus background (rows, columns, 4) of tilts (rows, columns, 2) at each `step`-th pixel."""
+    size, count = table.shape[0], table.shape[2]
+    scale, half, place = 0.5 * (size - 1) / _STEEPEST, 0.5 * (size - 1), np.empty(count, dtype=np.float32)
+    for row in range(tilts.shape[0]):
+        y = (row * step - middle[1]) * over_unit
+        for column in range(tilts.shape[1]):
+            i, s = _cell(half + scale * tilts[row, column, 0], size)
+            j, t = _cell(half + scale * tilts[row, column, 1], size)
+            a, b, c, d = (1 - t) * (1 - s), (1 - t) * s, t * (1 - s), t * s
+            _place_terms((column * step - middle[0]) * over_unit, y, degree, place)
+            for k in range(4):
+                out[row, column, k] = 0
+            for m in range(count):
+                for k in range(4):
+                    out[row, column, k] += place[m] * (a * table[j, i, m, k] + b * table[j, i + 1, m, k]
+                                                       + c * table[j + 1, i, m, k] + d * table[j + 1, i + 1, m, k])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+def _colour(difference, step, background, light, image):
+    """Colours of all pixels from differences (rows, columns, 4) at each `step`-th, linear between them."""
+    over_step, zero, most, round_up = np.float32(1 / step), np.float32(0), np.float32(255), np.float32(0.5)
+    line, rise = np.empty((difference.shape[1], 3), dtype=np.float32), np.zeros((difference.shape[1], 3), dtype=np.float32)
     for row in range(image.shape[0]):
-        at, y = row // step, (row - middle[1]) * over_unit
+        at = row // step
         share = (row - at * step) * over_step
-        for k in range(tilts.shape[1]):
-            for c in range(2):
-                line[k, c] = tilts[at, k, c] + (share * (tilts[at + 1, k, c] - tilts[at, k, c]) if share > 0 else zero)
-        for k in range(tilts.shape[1] - 1):
-            line[k, 2], line[k, 3] = line[k + 1, 0] - line[k, 0], line[k + 1, 1] - line[k, 1]
-        at, phase = 0, 0      # counted, as a division for each pixel takes longer than all the rest
-        for column in range(image.shape[1]):
-            share = phase * over_step
-            tx, ty = line[at, 0] + share * line[at, 2], line[at, 1] + share * line[at, 3]
-            phase += 1
-            if phase == step:
-                at, phase = at + 1, 0
+        below = at + 1 if share > 0 else at
+        for k in range(line.shape[0]):
             for c in range(3):
-                value[c] = background[row, column, c]
-            if max(abs(tx), abs(ty)) > flat:
-                u, v = half + scale * tx, half + scale * ty
-                i, j = min(max(int(u), 0), size - 2), min(max(int(v), 0), size - 2)
-                s, t = min(max(u - i, zero), one), min(max(v - j, zero), one)
-                a, b, d, e = (one - t) * (one - s), (one - t) * s, t * (one - s), t * s
-                _place_terms((column - middle[0]) * over_unit, y, degree, place)
-                corner, along, down = table[j, i], table[j, i + 1], table[j + 1, i]
-                across = table[j + 1, i + 1]
-                for m in range(count):
-                    for c in range(4):
-                        value[c] += place[m] * (a * corner[m, c] + b * along[m, c] + d * down[m, c] + e * across[m, c])
-            left = light[row, column]
+                line[k, c] = difference[at, k, c] + share * (difference[below, k, c] - difference[at, k, c])
+        for k in range(line.shape[0] - 1):
             for c in range(3):
-                image[row, column, c] = np.uint8(min(max(value[c], zero), np.float32(255)) * left + np.float32(0.5))
+                rise[k, c] = over_step * (line[k + 1, c] - line[k, c])
+        for k in range(line.shape[0]):
+            for phase in range(min(step, image.shape[1] - k * step)):
+                column, far = k * step + phase, np.float32(phase)
+                left = light[row, column]
+                for c in range(3):
+                    value = background[row, column, c] + line[k, c] + far * rise[k, c]
+                    image[row, column, c] = np.uint8(min(max(value, zero), most) * left + round_up)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 _MOST_NUMBERS = 200      # taxels beyond which their counts are not written into the cells
 _LIGHT = 0.6             # share of the colour range from which on a number is written in black
 _HEIGHT = 2.6            # inches of a row that is no map
+_WIDTH = 2.0             # inches of a panel, about
+_LONGEST = 0.12          # of the image's width: longest arrow of a marker's motion
+_TIMES = (1, 2, 5, 10)   # that arrows are drawn longer, at most
 
 
 def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | None" = None) -> "Figure":
@@ -31,14 +34,16 @@ def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | N
     plane = result.deformation_map_mm is not None
     ratio = (result.y_mm[-1] - result.y_mm[0]) / (result.x_mm[-1] - result.x_mm[0]) if plane else 0.0
     maps = sum(row in (_draw_map, _draw_taxels) for row, *_ in rows)
-    figure.set_size_inches(1.2 + 2.3 * result.steps, 2.4 + 1.6 * maps * ratio + _HEIGHT * (len(rows) - maps))
+    images = [given[-1].shape[1] / given[-1].shape[2] for row, _, _, *given in rows if row in (_draw_image, _draw_depth)]
+    others = _HEIGHT * (len(rows) - maps - len(images)) + sum(0.7 + _WIDTH * shape for shape in images)
+    figure.set_size_inches(1.2 + 2.3 * result.steps, 2.4 + 1.6 * maps * ratio + others)
     figure.set_layout_engine("constrained")
     axes = figure.subplots(max(len(rows), 1), result.steps, squeeze=False)
     for line, (row, name, label, *given) in zip(axes, rows, strict=False):
-        images = [row(result, axis, step, *given) for step, axis in enumerate(line)]
+        drawn = [row(result, axis, step, *given) for step, axis in enumerate(line)]
         line[0].set_ylabel(name)
-        if images[-1] is not None:
-            figure.colorbar(images[-1], ax=line, label=label)
+        if drawn[-1] is not None:
+            figure.colorbar(drawn[-1], ax=line, label=label)
     for step, force in enumerate(result.normal_force_n):
         axes[0, step].set_title(f"{force:.4g} N, depth {result.indentation_mm[step]:.3g} mm", fontsize=9)
     figure.suptitle(f"{result.model} model, sensor {result.sensor}")
@@ -48,7 +53,8 @@ def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | N
 def _rows(result, full_scale):
     """For each row: its drawing function, its name, the meaning of its colours, and further arguments of the function."""
     if result.deformation_map_mm is not None:
-        yield _draw_map, "deformation: y (mm)", "towards the PCB (mm)"
+        below = "PCB" if "taxels" in result.readings else "base"
+        yield _draw_map, "deformation: y (mm)", f"towards the {below} (mm)"
     taxels = result.readings.get("taxels")
     if taxels is not None and result.deformation_map_mm is not None and taxels.dims == ("step", "row", "column"):
         highest = result.largest_counts if full_scale else max(float(result.tactile_map.max()), 1.0)
@@ -57,8 +63,14 @@ def _rows(result, full_scale):
     if result.solid is not None:
         largest = float(np.linalg.norm(result.solid.displacement_mm, axis=2).max()) or 1.0
         yield _draw_solid, "solids: z (mm)", "displacement (mm)", largest
+    cameras = [name for name, reading in result.readings.items() if "channel" in reading.dims]
+    markers = next((reading for reading in result.readings.values() if "rest_x_px" in reading.coords), None)
     for name, reading in result.readings.items():
-        if name != "taxels":
+        if name in cameras:
+            yield _draw_image, f"{name}: row (px)", "", markers, reading
+        elif {"y", "x"} <= set(reading.dims):
+            yield _draw_depth, f"{name}: row (px)", f"{name} ({reading.attrs.get('units', '')})", float(np.nanmax(reading)), reading
+        elif name != "taxels" and not (cameras and "marker" in reading.dims):
             yield _draw_reading, name, "", reading
 
 
@@ -105,6 +117,25 @@ def _draw_solid(result, axis, step, largest):
     rigid = solid.object_points_mm + solid.object_displacement_mm[step]
     axis.plot(rigid[:, 0], rigid[:, 2], ".", color="0.7", markersize=2)
     return axis.scatter(x[order], z[order], c=np.linalg.norm(moved, axis=1)[order], s=6, vmin=0, vmax=largest, cmap="viridis")
+
+
+def _draw_image(result, axis, step, markers, reading):
+    """A camera's image at a load step, with arrows from where its markers were at rest, of one scale at all steps."""
+    axis.imshow(reading.values[step])
+    axis.set_xlabel("column (px)")
+    if markers is None:
+        return
+    rest = np.column_stack([markers["rest_x_px"].values, markers["rest_y_px"].values])
+    moved = markers.values - rest
+    most, room = np.linalg.norm(moved, axis=2).max(axis=1), _LONGEST * reading.shape[2]
+    times = max((times for times in _TIMES if times * most.max() <= room), default=1)
+    axis.quiver(*rest.T, *times * moved[step].T, angles="xy", scale_units="xy", scale=1, color="yellow", width=0.007)
+    axis.set_title(f"moved {most[step]:.2g} px" + (f", drawn x {times}" if times > 1 else ""), fontsize=8)
+
+
+def _draw_depth(result, axis, step, largest, reading):
+    axis.set_xlabel("column (px)")
+    return axis.imshow(reading.values[step], vmin=0, vmax=largest or 1.0, cmap="gray")
 
 
 def _draw_reading(result, axis, step, reading):

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _ABSENT: Any = None      # a field that a sensor or a model does not have
 _LATER = {"later": True}     # a field that files of earlier versions do not hold
 _PLANE = {"plane": True}     # a field of sensors with a plane of maps
+_STUCK_MM = 1e-9     # of a path along the object: what rounding leaves
 
 
 def _array(units: str, *dimensions: str, coordinate: str | None = None) -> dict[str, Any]:
@@ -172,6 +173,17 @@ class PressResult:
             raise InputError(f"{self.sensor} has no readout 'taxels'; its readings are {', '.join(self.readings) or 'none'}.")
         values: np.ndarray = self.readings["taxels"].values
         return values
+
+    @property
+    def slipping_share(self) -> np.ndarray:
+        """(step,) share of the points of the map in contact that slid along the object in the step; nan where nothing touches, or
+        the model has no friction."""
+        if self.deformation_map_mm is None:
+            return np.full(self.steps, np.nan)
+        touching = np.isfinite(self.slip)
+        before = np.concatenate([np.zeros((1, *self.slip.shape[1:])), np.nan_to_num(self.slip[:-1])])
+        slid, count = (touching & (self.slip - before > _STUCK_MM)).sum(axis=(1, 2)), touching.sum(axis=(1, 2))
+        return np.where(count > 0, slid / np.maximum(count, 1), np.nan)
 
     @property
     def taxels_at_range_end(self) -> np.ndarray:

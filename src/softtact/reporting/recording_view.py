@@ -1,14 +1,12 @@
 """A recording of a TSF-85 as a strip of pictures or a video: taxels of both fingers, sums of counts, and force over time."""
 
-import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softtact.errors import InputError, how_to_install
-from softtact.files import atomic_path
+from softtact.imaging.movies import write_movie
 from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:
@@ -48,16 +46,11 @@ def draw_strip(recording: "xarray.Dataset") -> "Figure":
 
 def save_video(recording: "xarray.Dataset", path: str | Path) -> None:
     """Write a GIF or an MP4 (extra `optics`) that plays a recording in real time, or faster if it is longer than 30 s."""
-    path = Path(path)
-    write = {".gif": _write_gif, ".mp4": _write_mp4}[path.suffix.lower()]
-    if write is _write_mp4 and importlib.util.find_spec("av") is None:
-        raise InputError(f"{path}: {how_to_install('av')}")
-    with atomic_path(path) as temporary:
-        write(temporary, _frames(recording))
+    write_movie(path, _frames(recording), fps=_RATE_HZ)
 
 
 def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
-    """Pictures (height, width, 3) of a recording, with even numbers of pixels for video codecs."""
+    """Pictures (height, width, 3) of a recording."""
     time, counts = recording.time.values, recording.counts.values
     number = int(np.clip(_RATE_HZ * (time[-1] - time[0]), 1, _MOST_FRAMES))
     fingers, limits = counts.shape[1], _limits(counts)
@@ -80,28 +73,8 @@ def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
         figure.suptitle(_label(recording, reading), fontsize=9)
         figure.canvas.draw()
         frame = np.asarray(figure.canvas.buffer_rgba())[..., :3]
-        yield frame[:frame.shape[0] // 2 * 2, :frame.shape[1] // 2 * 2].copy()
+        yield frame.copy()
     pyplot().close(figure)
-
-
-def _write_gif(path, frames):
-    from PIL import Image
-
-    first, *others = [Image.fromarray(frame).quantize(64) for frame in frames]
-    first.save(path, format="GIF", save_all=True, append_images=others, duration=1000 // _RATE_HZ, loop=0)
-
-
-def _write_mp4(path, frames):
-    import av
-
-    with av.open(str(path), "w", format="mp4") as container:
-        stream: Any = container.add_stream("libx264", rate=_RATE_HZ)
-        stream.pix_fmt = "yuv420p"
-        for number, values in enumerate(frames):
-            if not number:
-                stream.height, stream.width = values.shape[:2]
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(values), format="rgb24")))
-        container.mux(stream.encode())
 
 
 def _limits(counts):

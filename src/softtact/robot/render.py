@@ -17,7 +17,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from softtact.drawing import drawn_apart
-from softtact.files import atomic_path
 from softtact.press.plot import save
 from softtact.robot.arm import JOINTS
 from softtact.robot.events import GraspRecord
@@ -45,20 +44,6 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
         images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], Path(folder), sentence=_NO_PICTURE,
                              timeout_s=timeout_s, environment=environment)
     return None if images is None else images["images"]
-
-
-def write_video(path: str | Path, images: np.ndarray, *, fps: float) -> None:
-    """Write images (n, height, width, 3) as an H.264 MP4 file (needs the extra `optics`)."""
-    import av
-
-    with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=round(fps))
-        stream.height, stream.width, stream.pix_fmt = images.shape[1], images.shape[2], "yuv420p"
-        for image in images:
-            for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
-                container.mux(packet)
-        for packet in stream.encode():
-            container.mux(packet)
 
 
 def state_of(scene: Scene, record: GraspRecord, row: int) -> np.ndarray:
