@@ -4,9 +4,10 @@
 
 The history is that of `sliding`: forces, and for each touching point its place under the object, which a stuck point keeps and a
 sliding one changes by its slip. Places are in the object's frame, so the object may turn about the vertical. The object's underside
-is evaluated at these places, exact to its triangles. Unlike there, all displacement aside moves a place, that by pressure, too: the
-gel bulges by tenths of a millimetre (`pressure_moves` False leaves it out, for comparisons). Pressure acts along z, and the
-surface's rotation is neglected: the model is linear in all but the contact.
+is evaluated at these places, exact to its triangles. Displacement by pressure alone moves no place: with it (`pressure_moves`, for
+comparisons) forces are farther from those of finite strains (docs/explanation/gels.md). A point that loses contact keeps its place
+until it is free of the object at its place by friction's displacement, too. Pressure acts along z, and the surface's rotation is
+neglected: the model is linear in all but the contact.
 
 Increments are solved on a window of the grid around the contact (`grid_contact`). Fields outside of it follow where they are asked
 for, since forces are zero there. With friction an increment moves the object aside, at the rim of what it presses, by at most
@@ -15,7 +16,6 @@ for, since forces are zero there. With friction an increment moves the object as
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,9 @@ from softtact.models.elastic.wide_layer import WideLayer
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-_ASIDE, _DOWN = 0.8, 0.8        # of the points' distance: the largest movements in an increment with friction
+# Of the points' distance: the largest movements in an increment with friction; down, while nothing touches. The fastest increment
+# over the last one that takes over its trend, in which a turn counts as the way of a point at this distance.
+_ASIDE, _DOWN, _DOWN_AT_FIRST, _FASTEST, _ARM_MM = 0.8, 0.8, 0.2, 5.0, 1.0
 _MARGIN, _BLOCK = 3, 8          # points around the contact in a window, and the multiple to which its sides are rounded up
 _BULGE, _LEAST_MM = 1.1, 0.03   # the surface may touch where the object is below these times the depth, and so much more
 # Passes of an increment with friction and without, between which places and heights follow the surface; halvings of the time of
@@ -114,10 +116,12 @@ class _State:
     tangential: np.ndarray
     path: np.ndarray
     sticks: np.ndarray
+    tracked: np.ndarray
     window: _Window | None = None
     moved: np.ndarray = field(default_factory=lambda: np.zeros(0))
     aside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     down: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    trend: np.ndarray | None = None
     stored_mj: float = 0.0
     work_mj: float = 0.0
     dissipated_mj: float = 0.0
@@ -133,17 +137,19 @@ class WideObject:
     """
 
     def __init__(self, layer: WideLayer, underside: Surface, grid: tuple[np.ndarray, np.ndarray], *, first_touch_mm: float,
-                 friction: float, about_mm: tuple[float, float] = (0.0, 0.0), pressure_moves: bool = True,
+                 friction: float, about_mm: tuple[float, float] = (0.0, 0.0), pressure_moves: bool = False,
                  settings: CoulombSettings = _SETTINGS) -> None:
         self.layer, self.friction, self.settings, self.pressure_moves = layer, friction, settings, pressure_moves
         self._underside, self._first_touch, self._about = underside, first_touch_mm, np.array(about_mm)
         self.points = np.stack(np.meshgrid(*grid))
         self._shape = self.points.shape[1:]
         self._solvers: dict[tuple[int, ...], GridSolver] = {}
-        self._pace: tuple[Any, ...] = ()     # of the last increments
-        self._before: tuple[np.ndarray, np.ndarray] | None = None     # forces before the last increment, of the same pace
+        self._pace: np.ndarray | None = None     # of the last increments
+        self._before: tuple[np.ndarray, np.ndarray] | None = None     # forces before the last increment, if the next goes on as it
+        self._ratio = 0.0                        # of the next increment to the last one
         zeros = np.zeros(self._shape)
-        self._state = _State(np.zeros(3), 0.0, self.points.copy(), zeros, np.zeros_like(self.points), zeros.copy(), zeros > 0)
+        self._state = _State(np.zeros(3), 0.0, self.points.copy(), zeros, np.zeros_like(self.points), zeros.copy(), zeros > 0,
+                             zeros > 0)
 
     # --- the object ---
 
@@ -179,24 +185,33 @@ class WideObject:
         count = self._increments(way, angle, depth, load)
         path, touched, turns = self._state.path.copy(), self._state.normal > 0, self._state.turns
         begin, loads = self._state.position[2], self._loads(load, count)
-        pace = *way / count, angle / count, None if depth is None else (depth - begin) / count
-        if not _alike(pace, self._pace):
-            self._pace, self._before = pace, None
+        self._set_pace(None if depth is None else np.array([*way, angle * _ARM_MM, depth - begin]) / count)
         for part in range(1, count + 1):
             self._advance(way / count, angle / count, None if depth is None else begin + (depth - begin) * part / count,
                           None if load is None else loads[part - 1])
         return self._step(path, touched, self._state.turns - turns, count)
 
+    def _set_pace(self, pace):
+        """Whether, and how much faster, increments of a pace (4,) go on along the last ones; under a load no pace is known."""
+        last, self._pace = self._pace, pace
+        self._ratio = 0.0
+        if pace is not None and last is not None and last.any():
+            ratio = (pace @ last) / (last @ last)
+            self._ratio = ratio if 0 < ratio <= _FASTEST and np.abs(pace - ratio * last).max() < 1e-9 else 0.0
+        if not self._ratio:
+            self._before = None
+
     def _increments(self, way, angle, depth, load):
         if self.friction == 0:
             return 1
         spacing, state = min(self.layer.step_mm), self._state
+        down_share = _DOWN if state.normal.any() else _DOWN_AT_FIRST
         down = (self._depth_on_springs(load) - self._depth_on_springs(state.normal.sum()) if depth is None
                 else depth - state.position[2])
         turned = abs(angle) * self._reach_about(max(state.position[2], depth or 0.0)) if angle else 0.0
         aside = np.linalg.norm(way) + turned
         count = max(1, *(int(np.ceil(distance / (share * spacing) - 1e-9))
-                         for distance, share in ((aside, _ASIDE), (abs(down), _DOWN))))
+                         for distance, share in ((aside, _ASIDE), (abs(down), down_share))))
         if count > _MOST_INCREMENTS:
             raise InputError(f"A step of {aside:.3g} mm aside and {abs(down):.3g} mm down needs {count} increments to follow the "
                              f"path of friction, more than {_MOST_INCREMENTS}; divide it into steps, or take a coarser map.")
@@ -287,7 +302,11 @@ class WideObject:
         else:
             state.aside = state.moved = np.zeros((2, *window.shape))
             state.down = np.zeros(window.shape)
-        state.window = window
+        state.window, state.trend = window, None
+        if self._before is not None:
+            before, now = (np.stack([*tangential[window.at], normal[window.at]])
+                           for normal, tangential in (self._before, (state.normal, state.tangential)))
+            state.trend = operator(now - before)
 
     # --- one increment ---
 
@@ -314,7 +333,7 @@ class WideObject:
         if touches.any():
             moved = self.layer.operator(self._shape, single=True)(force).astype(float)
         place = self._to_object(self.points + self._dragged_everywhere(moved, state), state.position, state.angle)
-        place[:, touches] = state.place[:, touches]
+        place[:, state.tracked] = state.place[:, state.tracked]
         heights = self.heights(place)
         rim = np.concatenate([touches[0], touches[-1], touches[:, 0], touches[:, -1]])
         sign = np.array([1.0, 1.0, -1.0])
@@ -342,12 +361,13 @@ class _Move:
         state = mover._state
         self.angle, at = state.angle + angle, window.at
         self.points, self.normal, self.tangential = mover.points[at], state.normal[at], state.tangential[at]
-        self.touched, self.sticks = self.normal > 0, state.sticks[at]
+        self.touched, self.sticks, self.tracked = self.normal > 0, state.sticks[at], state.tracked[at]
         here = self.points + state.aside
-        self.begin = np.where(self.touched, state.place[at], mover._to_object(here, state.position, state.angle))
-        here = np.where(self.touched, mover._from_object(self.begin, state.position, state.angle), here)
+        self.begin = np.where(self.tracked, state.place[at], mover._to_object(here, state.position, state.angle))
+        here = np.where(self.tracked, mover._from_object(self.begin, state.position, state.angle), here)
         self.way = mover._from_object(self.begin, position, self.angle) - here
         self.place = np.where(self.sticks, self.begin, mover._to_object(here, position, self.angle))
+        self.trend = np.zeros((3, *self.points.shape[1:])) if state.trend is None else mover._ratio * state.trend
         self.still = not (self.way.any() and mover.friction > 0 and self.touched.any())
 
     def solve(self) -> GridContact:
@@ -358,7 +378,8 @@ class _Move:
         solver, heights, rough = mover._solver(self.window), mover.heights(self.place), _ROUGH
         for number in range(_PASSES if mover.friction else _PASSES_WITHOUT):
             self.gap = np.where(allowed, heights, NO_CONTACT_MM) if (heights[allowed] < 0.5 * NO_CONTACT_MM).any() else heights
-            carried = state.moved + self._share(expected) * self.way
+            share = self._share(expected)
+            carried = state.moved + share * self.way + (1 - share) * self.trend[:2]
             increment = GridIncrement(self.gap, carried, mover.friction, self.depth, self.load)
             found = solver.solve(increment, *self._guess(guess), rough=rough)
             self.place, expected = self._places(found), found.depth
@@ -373,7 +394,8 @@ class _Move:
         """Forces to begin with: of the last pass, or of an increment before, extrapolated where that was of the same step."""
         normal, tangential = guess
         if guess[0] is self.normal and self.mover._before is not None:
-            normal, tangential = (2 * now - before[self.window.at] for now, before in
+            ratio = self.mover._ratio
+            normal, tangential = ((1 + ratio) * now - ratio * before[self.window.at] for now, before in
                                   zip(guess, self.mover._before, strict=True))
             normal = np.where(self.normal > 0, np.maximum(normal, 0.0), 0.0)
         if normal.any() or self.load is None:
@@ -384,17 +406,20 @@ class _Move:
         return np.clip(depth - self.gap, 0.0, None) * spring[0], tangential
 
     def _share(self, depth):
-        """The share (ny, nx) of an increment in which a point touches: 1 if it did before, else from where its gap closes."""
+        """The share (ny, nx) of an increment in which a point touches: 1 if it did before, else from where its gap closes.
+
+        Until then it goes on as in the increment before (`trend`).
+        """
         mover, state, share = self.mover, self.mover._state, np.ones(self.window.shape)
         if mover.friction == 0:
             return share
         coming = ~self.touched & (self.gap - depth + state.down < 0)
-        begin, end, down = self.begin[:, coming], self.place[:, coming], state.down[coming]
+        begin, end, down, trend = self.begin[:, coming], self.place[:, coming], state.down[coming], self.trend[2][coming]
         low, high = np.zeros(begin.shape[1]), np.ones(begin.shape[1])
         for _ in range(_HALVINGS if begin.shape[1] else 0):
             middle = 0.5 * (low + high)
             lowered = state.position[2] + middle * (depth - state.position[2])
-            closed = mover.heights(begin + middle * (end - begin)) - lowered + down < 0
+            closed = mover.heights(begin + middle * (end - begin)) - lowered + down + middle * trend < 0
             low, high = np.where(closed, low, middle), np.where(closed, middle, high)
         share[coming] = 1 - 0.5 * (low + high)
         return share
@@ -406,16 +431,23 @@ class _Move:
         place = mover._to_object(self.points + aside, self.position, self.angle)
         if mover.friction == 0:
             return place
-        touching = found.normal > 0
-        stayed = touching & self.touched
         along = _turn(aside - state.aside - self.way, -self.angle) * ~found.sticks
-        place = np.where(stayed, self.begin + along, place)
-        new = np.flatnonzero((touching & ~self.touched).ravel())
+        place = np.where(self.tracked, self.begin + along, place)
+        new = np.flatnonzero(((found.normal > 0) & ~self.tracked).ravel())
         if len(new):
             flat = place.reshape(2, -1)
             out = new[mover.heights(flat[:, new]) >= 0.5 * NO_CONTACT_MM]
             flat[:, out] = self.place.reshape(2, -1)[:, out]
         return place
+
+    def _still_over(self, found, touching):
+        """Which points (ny, nx) have lost contact, but would overlap the object at the place that friction alone gives them."""
+        lost = self.tracked & ~touching
+        if not lost.any() or self.mover.friction == 0:
+            return np.zeros_like(lost)
+        free = self.mover._to_object((self.points + self.mover.aside_of(found))[:, lost], self.position, self.angle)
+        lost[lost] = self.mover.heights(free) - found.depth + found.down[lost] < 0
+        return lost
 
     def finish(self, found):
         """Make the contact the state, with its energies by the trapezoidal rule."""
@@ -428,20 +460,17 @@ class _Move:
         path, place = state.path.copy(), state.place.copy()
         path[at] = np.where(touching, state.path[at] * self.touched + np.linalg.norm(slip, axis=0), 0.0)
         place[at] = self.place
-        self.mover._before = state.normal, state.tangential
+        self.mover._before, self.mover._ratio = (state.normal, state.tangential), 1.0
+        trend = np.stack([*(moved - state.moved), found.down - state.down])
         fields = {name: _spread(getattr(state, name), at, values) for name, values in
-                  (("normal", found.normal), ("tangential", found.tangential), ("sticks", found.sticks))}
+                  (("normal", found.normal), ("tangential", found.tangential), ("sticks", found.sticks),
+                   ("tracked", touching | self._still_over(found, touching)))}
         self.mover._state = replace(
             state, position=np.append(self.position[:2], found.depth), angle=self.angle, place=place, path=path, moved=moved,
             aside=self.mover.aside_of(found), down=found.down, work_mj=state.work_mj + work,
-            dissipated_mj=state.dissipated_mj + rubbed,
+            dissipated_mj=state.dissipated_mj + rubbed, trend=trend,
             stored_mj=0.5 * float((found.normal * found.down).sum() + (found.tangential * moved).sum()),
             turns=state.turns + found.turns, **fields)
-
-
-def _alike(pace, last):
-    """Whether two increments move the object alike; a load has no pace."""
-    return len(pace) == len(last) and None not in pace + last and np.allclose(pace, last, rtol=1e-6, atol=1e-12)
 
 
 def _column(pair, like):
