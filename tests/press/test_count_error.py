@@ -9,7 +9,7 @@ import pytest
 from support.sensors import CORO
 
 from softtact.commands.press import _count_lines
-from softtact.press.count_error import ELASTIC, hyperelastic_counts, mean_depth
+from softtact.press.count_error import ELASTIC, FOUNDATION, hyperelastic_counts, mean_depth
 from softtact.press.result import PressResult, read_press
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.registry import labelled
@@ -38,17 +38,20 @@ def test_what_the_hyperelastic_model_reads_is_the_reading_of_a_map_that_is_so_mu
     assert hyperelastic_counts(CORO, press([0.05, 0.4])) == pytest.approx(np.array(expected), rel=1e-9)
 
 
-def test_the_foundation_models_counts_lie_between_those_of_maps_that_are_deeper_and_less_deep_by_its_error():
-    found = hyperelastic_counts(CORO, press([0.2, 0.2], "foundation"), np.array([0.05, np.inf]))
-    assert found[0] == pytest.approx([read_at(0.2, 0.05), read_at(0.2, 0.0), read_at(0.2, -0.05)], rel=1e-9)
-    assert np.isnan(found[1]).all(), "where the error is not known"
+def test_the_foundation_models_counts_have_its_own_shares_and_none_where_its_error_is_not_known():
+    found = hyperelastic_counts(CORO, press([0.2, 0.2], "foundation"), FOUNDATION, np.array([True, False]))
+    middle = FOUNDATION.at_rest + 0.2 * FOUNDATION.per_thickness
+    shares = (middle + FOUNDATION.above, middle, middle + FOUNDATION.below)
+    assert found[0] == pytest.approx([read_at(0.2, share) for share in shares], rel=1e-9)
+    assert np.isnan(found[1]).all()
 
 
-def test_one_in_twenty_of_the_recorded_presses_is_below_the_interval_and_the_middle_is_theirs():
+@pytest.mark.parametrize(("model", "error"), [("elastic", ELASTIC), ("foundation", FOUNDATION)])
+def test_one_in_twenty_of_the_recorded_presses_is_below_the_interval_and_the_middle_is_theirs(model, error):
     rows = json.loads((Path(__file__).parents[2] / "benchmarks/results/count_errors.json").read_text())["rows"]
-    left = np.array([row["gain_error"] - ELASTIC.at_rest - ELASTIC.per_thickness * row["mean_depth_mm"] for row in rows
-                     if row["valid"]])
-    assert 0.02 < np.mean(left < ELASTIC.below) < 0.1 and np.mean(left > ELASTIC.above) < 0.1
+    left = np.array([row["gain_error"] - error.at_rest - error.per_thickness * row["mean_depth_mm"] for row in rows
+                     if row["valid"] and row["model"] == model])
+    assert 0.02 < np.mean(left < error.below) < 0.1 and np.mean(left > error.above) < 0.1
     assert abs(np.median(left)) < 0.004
 
 

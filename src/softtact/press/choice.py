@@ -21,7 +21,7 @@ from trimesh import Trimesh
 from softtact.errors import ConvergenceError, InputError, ShellWarning, TimeLimitError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
 from softtact.press.cache import in_words
-from softtact.press.count_error import hyperelastic_counts
+from softtact.press.count_error import FOUNDATION, hyperelastic_counts
 from softtact.press.fast import press_elastic, press_on_foundation
 from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.reached import Reached
@@ -126,10 +126,8 @@ def _counts_of_hyperelastic(sensor, result):
     """Counts (l, 3) to expect of the hyperelastic model where a fast model was pressed."""
     if result.model == "elastic":
         return hyperelastic_counts(sensor.spec, result)
-    error = foundation_error(result, height_mm=sensor.spec.frustum_height_mm, thickness_mm=sensor.spec.thickness_mm)
-    depth = rms(result.deformation_map_mm)
-    relative = np.divide(error, depth, out=np.zeros_like(depth), where=depth > 0)
-    return hyperelastic_counts(sensor.spec, result, INTERVALS["foundation"][1] * relative)
+    expected = foundation_error(result, height_mm=sensor.spec.frustum_height_mm, thickness_mm=sensor.spec.thickness_mm)
+    return hyperelastic_counts(sensor.spec, result, FOUNDATION, np.isfinite(expected))
 
 
 def _with_interval(result, name):
