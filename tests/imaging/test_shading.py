@@ -111,3 +111,9 @@ def test_a_prepared_grid_draws_the_same_image_in_single_precision():
 def test_a_background_of_another_resolution_is_refused():
     with pytest.raises(InputError, match="its image has 64 x 48 px, the background 32 x 48 px"):
         BallPress(BACKGROUND, BACKGROUND[:, ::2], (10, 10), 5.0)
+
+
+def test_a_slope_steeper_than_any_that_was_fitted_has_the_colour_of_the_steepest():
+    model = fitted(QuadraticShading, TRUE)
+    steep, steeper = (model.difference(slope, 0.0, 10.0, 12.0) for slope in (3.0, 30.0))
+    assert model.largest_tilt < 0.6 and steep == pytest.approx(steeper)

@@ -152,8 +152,8 @@ def tables(depth_error, markers, mae):
                            "components": markers})
     shading = pd.DataFrame([{"set": "s", "circles": circles, "model": model, "press": k, "mae": mae + 0.01 * k} for k in range(8)
                             for circles in ("labelled", "found") for model in ("table", "phong", "quadratic in tilt")])
-    size = pd.DataFrame({"set": "s", "model": "phong", "ball_px": [10, 20, 30], "best_px": 20, "best_low_px": 20,
-                         "best_high_px": 20})
+    size = pd.DataFrame({"set": "s", "model": "phong", "ball_px": [10, 20, 30], "mae": [5.0, 4.0, 5.0], "best_px": 20,
+                         "best_low_px": 20, "best_high_px": 20})
     return {"gel_force": force, "markers": motion, "other_markers": motion.assign(image="shear"), "shading": shading,
             "ball_size": size}
 

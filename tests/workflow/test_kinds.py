@@ -39,6 +39,7 @@ CASES = [
     Case("skin", "config/tiny_skin.yaml", ("draws: 200", "draws: 201"), "skin/maps.py", "read_taxels"),
     Case("decide", "config/tiny_decide.yaml", ("epochs: 3", "epochs: 4"), "readout/virtual_sensor.py", "press"),
     Case("markers", "config/tiny_markers.yaml", ("epochs: 4", "epochs: 5"), "learning/image_training.py", "press_object"),
+    Case("real", "config/tiny_real.yaml", ("rounds: 1", "rounds: 2"), "imaging/shading.py", "press_ball"),
     Case("palpation", "config/tiny_probe.yaml", ("variant_steps: 3", "variant_steps: 4"), "probe/structure.py", "sweep"),
 ]
 # The stages that these changes rerun, by hand; those of the other kinds follow from their list of jobs.

@@ -31,6 +31,7 @@ from softtact.files import atomic_path, digest, read_yaml
 
 CHANNELS = 3
 SHIPPED = Path(str(resources.files("softtact.imaging"))) / "data"
+_STEEPEST = 0.999      # quantile of the samples' tilts that counts as the largest fitted
 _DIGITS = 6             # of the numbers in a file
 
 
@@ -194,6 +195,8 @@ class QuadraticShading(Shading):
     kind: ClassVar[str] = "quadratic"
     terms: np.ndarray = field(kw_only=True)
     """(tilt term, place term, 3); the tilt's terms start with the linear ones, so no tilt means no difference."""
+    largest_tilt: float = field(default=1.0, kw_only=True)
+    """Largest tilt that was fitted; a steeper surface has the colours of that tilt in its direction."""
 
     def at_places(self, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """Coefficients of the tilt's powers at some places, (tilt term, ..., 3)."""
@@ -201,7 +204,8 @@ class QuadraticShading(Shading):
 
     def difference_at(self, slope_x: np.ndarray, slope_y: np.ndarray, prepared: np.ndarray) -> np.ndarray:
         """See `Shading.difference_at`."""
-        tilts = _tilt_powers(slope_x, slope_y, _degree_of(len(self.terms) + 1), like=prepared)
+        tilt_x, tilt_y = self._tilt(slope_x, slope_y, prepared.dtype)
+        tilts = _powers(tilt_x, tilt_y, _degree_of(len(self.terms) + 1))[1:]
         total = tilts[0][..., None] * prepared[0]
         for tilt, coefficient in zip(tilts[1:], prepared[1:], strict=True):
             total = total + tilt[..., None] * coefficient
@@ -216,12 +220,21 @@ class QuadraticShading(Shading):
         degree, place_degree = options.get("tilt_degree", 2), options.get("place_degree", 1)
         empty = np.zeros((_count(degree) - 1, _count(place_degree), CHANNELS))
         model = cls(pixels=pixels, background_terms=smooth_background(background), terms=empty)
-        tilt = np.stack(_tilt_powers(samples.slope_x, samples.slope_y, degree), axis=-1)
+        tilt_x, tilt_y = _tilt(samples.slope_x, samples.slope_y)
+        tilt = np.stack(_powers(tilt_x, tilt_y, degree)[1:], axis=-1)
         place = model._place_powers(samples.x_px, samples.y_px)
         matrix = (tilt[:, :, None] * place[:, None, :]).reshape(len(tilt), -1)
         normal = matrix.T @ matrix
         normal += options.get("ridge", 1e-6) * np.trace(normal) / len(normal) * np.eye(len(normal))
-        return replace(model, terms=np.linalg.solve(normal, matrix.T @ samples.difference).reshape(empty.shape))
+        terms = np.linalg.solve(normal, matrix.T @ samples.difference).reshape(empty.shape)
+        return replace(model, terms=terms, largest_tilt=float(np.quantile(np.hypot(tilt_x, tilt_y), _STEEPEST)))
+
+    def _tilt(self, slope_x, slope_y, dtype):
+        """Tilt along x and y, not beyond the largest."""
+        slopes = np.broadcast_arrays(slope_x, slope_y)
+        x, y = _tilt(*(one.astype(dtype, copy=False) for one in slopes))
+        over = np.minimum(1.0, self.largest_tilt / np.maximum(np.hypot(x, y), 1e-9)).astype(dtype)
+        return x * over, y * over
 
 
 @dataclass(frozen=True)
@@ -236,7 +249,7 @@ class SlopeTable(QuadraticShading):
 
     def difference_at(self, slope_x: np.ndarray, slope_y: np.ndarray, prepared: np.ndarray) -> np.ndarray:
         """See `Shading.difference_at`."""
-        added = _between(self.table.astype(prepared.dtype), *_tilt(slope_x, slope_y))
+        added = _between(self.table.astype(prepared.dtype), *self._tilt(slope_x, slope_y, prepared.dtype))
         return super().difference_at(slope_x, slope_y, prepared) + added
 
     @classmethod
@@ -253,7 +266,8 @@ class SlopeTable(QuadraticShading):
         weight = gaussian_filter(counts, width, mode="constant")[..., None] + options.get("prior", 20)
         table = gaussian_filter(sums, (width, width, 0), mode="constant") / weight
         table[size // 2, size // 2] = 0      # no tilt, no difference
-        return cls(pixels=poly.pixels, background_terms=poly.background_terms, terms=poly.terms, table=table, counts=counts)
+        return cls(pixels=poly.pixels, background_terms=poly.background_terms, terms=poly.terms, largest_tilt=poly.largest_tilt,
+                   table=table, counts=counts)
 
 
 @dataclass(frozen=True)
@@ -364,12 +378,6 @@ def _tilt(slope_x, slope_y):
     """Sine of the surface's angle along x and y."""
     over = 1 / np.sqrt(1 + np.square(slope_x) + np.square(slope_y))
     return slope_x * over, slope_y * over
-
-
-def _tilt_powers(slope_x, slope_y, degree, *, like=None):
-    """Powers of the tilt, a list without the constant; in the precision of `like`."""
-    slopes = np.broadcast_arrays(slope_x, slope_y)
-    return _powers(*_tilt(*(slopes if like is None else (one.astype(like.dtype, copy=False) for one in slopes))), degree)[1:]
 
 
 def _powers(x, y, degree):

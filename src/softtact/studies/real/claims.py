@@ -73,14 +73,12 @@ def _shading(name, table, limit, made):
 
 
 def _size(name, own, made):
-    """The ball's size is found if the interval of some model's best size is inside the range that was searched."""
-    words = []
-    inside = False
-    for model, rows in own.groupby("model", sort=False):
-        one = rows.iloc[0]
-        words.append(f"{model} {one.best_px:.0f} px ({one.best_low_px:.0f} to {one.best_high_px:.0f})")
-        inside |= bool(rows.ball_px.min() < one.best_low_px and one.best_high_px < rows.ball_px.max())
+    """The ball's size is found if the best size of the model with the least error lies, with its interval, inside the range."""
+    each = own.drop_duplicates("model").itertuples()
+    words = [f"{one.model} {one.best_px:.0f} px ({one.best_low_px:.0f} to {one.best_high_px:.0f})" for one in each]
+    best = own[own.model == own.model[own.mae.idxmin()]].iloc[0]
+    inside = bool(own.ball_px.min() < best.best_low_px and best.best_high_px < own.ball_px.max())
     return row(f"The ball's size of {name} follows from its colours", "shading", "not stated",
                MADE if made else "; ".join(words), UNDECIDED if made or not inside else verdict_of(True),
-               "the 95 % interval of the best size lies inside the range searched", "tables/ball_size.csv",
-               uncertainty="presses drawn with replacement")
+               "model with the least error: the 95 % interval of its best size lies inside the range searched",
+               "tables/ball_size.csv", uncertainty="presses drawn with replacement")

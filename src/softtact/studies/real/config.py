@@ -93,7 +93,7 @@ class ShadingStudy(Section):
     tilt_degree: PositiveInt = Field(description="of the polynomials in the tilt")
     place_degree: PositiveInt = Field(description="of their coefficients in the place")
     rounds: PositiveInt = Field(description="of finding circles and fitting the shading in turn")
-    ball_ratios: list[Annotated[float, Field(gt=1)]] = Field(
+    ball_ratios: list[Annotated[float, Field(gt=0.2)]] = Field(
         description="balls' radii over the largest labelled circle, among which the size is searched")
 
 

@@ -12,7 +12,7 @@ from softtact.studies.real.stages.force import ELASTIC, elastic_path
 from softtact.studies.real.stages.markers import FORMULAS, LAYER, PHYSICS
 
 _LINES = ("-", "--", "-.", ":")
-_COLOURS = ("#1f4e79", "#e08214", "#3f9c6d", "#7b3f8c", "0.4")
+_COLOURS = ("#1f4e79", "#e08214", "#3f9c6d", "#7b3f8c", "0.4", "#c0392b")
 _ARROWS = 6.0       # times the motion
 
 
@@ -50,7 +50,7 @@ def draw_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
     """Draw the measured and the predicted motion of the markers, enlarged.  inputs: motion (CSV);  outputs: png, svg"""
     table = pd.read_csv(inputs["motion"])
     models = [name for name in (PHYSICS, FORMULAS, LAYER) if f"{name} x_px" in table]
-    figure = pyplot().figure(figsize=(3.3 * len(models), 3.0), layout="constrained")
+    figure = pyplot().figure(figsize=(3.3 * len(models), 3.2), layout="constrained")
     for axes, model in zip(figure.subplots(1, len(models), sharey=True, squeeze=False)[0], models, strict=True):
         for columns, colour, label in ((("measured_x_px", "measured_y_px"), "0.55", "measured"),
                                        ((f"{model} x_px", f"{model} y_px"), _COLOURS[0], "model")):
@@ -61,7 +61,7 @@ def draw_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
         axes.set_aspect("equal")
     figure.axes[0].invert_yaxis()
     figure.axes[0].set_ylabel(f"row (px); arrows {_ARROWS:g} times the motion")
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, fontsize=8)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8)
     save(figure, outputs["png"], outputs["svg"])
 
 
