@@ -165,7 +165,7 @@ def test_work_is_stored_or_rubbed_away():
 def test_a_stuck_path_gives_all_its_work_back():
     steps = follow(PUNCH, "z -0.2; x 0.04; x -0.04", friction=50.0)
     assert np.nanmax(steps[-1].path_mm) == 0.0 and steps[-1].dissipated_mj == 0.0
-    np.testing.assert_allclose(steps[-1].force_n, steps[0].force_n, atol=1e-4)      # N: 1e-4 mm over a point's 10 mm/N
+    np.testing.assert_allclose(steps[-1].force_n, steps[0].force_n, atol=1e-4)      # N: 2e-4 mm over a point's 10 mm/N
     assert steps[1].work_mj > steps[0].work_mj
 
 
@@ -174,7 +174,7 @@ def test_signs_and_gaps_are_as_documented():
     assert step.force_n[..., 0].sum() > 0 > step.force_n[..., 2].max(initial=-1) - 1e-12
     assert step.displacement_mm[30, 30, 0] > 0 > step.displacement_mm[30, 30, 2]
     touches = step.normal > 0
-    assert np.abs(step.gap_mm[touches]).max() < 5e-3 and (step.gap_mm[~touches] > -5e-3).all()
+    assert np.abs(step.gap_mm[touches]).max() < 3e-4 and (step.gap_mm[~touches] > -3e-4).all()     # the solver's tolerance, 2e-4
     assert np.isinf(step.gap_mm[0, 0]) and np.isnan(step.path_mm[~touches]).all() and not (step.slides & ~touches).any()
 
 

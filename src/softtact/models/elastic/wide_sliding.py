@@ -39,7 +39,7 @@ _BULGE, _LEAST_MM = 1.1, 0.03   # the surface may touch where the object is belo
 _PASSES, _PASSES_WITHOUT, _HALVINGS = 4, 12, 6
 _ROUGH, _SETTLED = 10.0, 10.0
 _MOST_INCREMENTS = 2000         # of one step
-_SETTINGS = CoulombSettings(tolerance_mm=1e-4, inner_share=0.3, inner_fall=0.1)
+_SETTINGS = CoulombSettings(tolerance_mm=2e-4, inner_share=0.3, inner_fall=0.1)
 _SINGLE_MM = 2e-5               # tolerance from which products in single precision are exact enough
 
 
@@ -122,6 +122,7 @@ class _State:
     aside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     down: np.ndarray = field(default_factory=lambda: np.zeros(0))
     trend: np.ndarray | None = None
+    heights: np.ndarray | None = None
     stored_mj: float = 0.0
     work_mj: float = 0.0
     dissipated_mj: float = 0.0
@@ -302,7 +303,7 @@ class WideObject:
         else:
             state.aside = state.moved = np.zeros((2, *window.shape))
             state.down = np.zeros(window.shape)
-        state.window, state.trend = window, None
+        state.window, state.trend, state.heights = window, None, None
         if self._before is not None:
             before, now = (np.stack([*tangential[window.at], normal[window.at]])
                            for normal, tangential in (self._before, (state.normal, state.tangential)))
@@ -335,6 +336,8 @@ class WideObject:
         place = self._to_object(self.points + self._dragged_everywhere(moved, state), state.position, state.angle)
         place[:, state.tracked] = state.place[:, state.tracked]
         heights = self.heights(place)
+        if state.heights is not None and state.window is not None:     # those of which the contact is the solution
+            heights[state.window.at] = state.heights
         rim = np.concatenate([touches[0], touches[-1], touches[:, 0], touches[:, -1]])
         sign = np.array([1.0, 1.0, -1.0])
         return WideStep(position=state.position.copy(), turned_deg=float(np.degrees(state.angle)),
@@ -468,7 +471,7 @@ class _Move:
         self.mover._state = replace(
             state, position=np.append(self.position[:2], found.depth), angle=self.angle, place=place, path=path, moved=moved,
             aside=self.mover.aside_of(found), down=found.down, work_mj=state.work_mj + work,
-            dissipated_mj=state.dissipated_mj + rubbed, trend=trend,
+            dissipated_mj=state.dissipated_mj + rubbed, trend=trend, heights=self.gap,
             stored_mj=0.5 * float((found.normal * found.down).sum() + (found.tangential * moved).sum()),
             turns=state.turns + found.turns, **fields)
 
