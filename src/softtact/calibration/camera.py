@@ -39,6 +39,8 @@ _OUTSIDE = 1.5            # contact radii up to which the search for the ball's 
 _COARSE = 160             # pixels of the longer side in the search for the middle
 _EVERY = 4                # pixels from one to the next that searches look at
 _FEWEST = 3               # presses
+_SPREAD = 0.5             # of the image that contacts must spread over for colours that differ from place to place
+_MANY = 12                # presses that determine how colours differ from place to place
 _CLEAN = 5                # images from which a background can be made by their median
 
 
@@ -205,6 +207,13 @@ def find_scale(presses: Sequence[BallPress], *, ball_mm: float, thickness_mm: fl
     return 0.5 * ball_mm / float(fine[np.argmin([misfit(size) for size in fine])])
 
 
+def covered_share(presses: Sequence[BallPress]) -> float:
+    """Share of the image's side, the smaller one of both, that the contacts spread over."""
+    circles = np.array([[*press.centre_px, press.radius_px] for press in presses])
+    spread = np.ptp(circles[:, :2], axis=0) + 2 * circles[:, 2].mean()
+    return float((spread / _pixels(presses)).min())
+
+
 def _gel(mm_per_px, *, ball_mm, thickness_mm, poisson):
     return Gel(0.5 * ball_mm / mm_per_px, thickness_mm / mm_per_px, poisson)
 
@@ -222,7 +231,11 @@ def _refuse_large(presses, gel, scale):
 
 
 def _fit(kind, presses, gel, background):
-    return KINDS[kind].fit(joined_samples(presses, gel, reach=1.2, step=2), _pixels(presses), background)
+    """A shading; of polynomials of a higher degree where many presses determine them, alike everywhere where these lie close by."""
+    many = len(presses) >= _MANY
+    place_degree = 0 if covered_share(presses) < _SPREAD else 2 if many else 1
+    options = {"tilt_degree": 4 if many else 2, "place_degree": place_degree}
+    return KINDS[kind].fit(joined_samples(presses, gel, reach=1.2, step=2), _pixels(presses), background, **options)
 
 
 def _error_on_others(kind, presses, gel, background):

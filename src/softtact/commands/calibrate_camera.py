@@ -107,9 +107,11 @@ def _write(files: dict[str, Path], found: "CameraCalibration", values: dict[str,
 
 
 def _summary(found, files):
+    from softtact.calibration.camera import covered_share
+
     return {"presses": len(found.presses), "circles_found": found.found, "mm_per_px": found.mm_per_px,
             "mm_per_px_found": found.scale_found, "ball_px": found.ball_px, "shading": found.shading.kind,
-            "error_levels": found.error_levels,
+            "error_levels": found.error_levels, "covered_share": covered_share(found.presses),
             "circles": [{"image": Path(press.name).name, "centre_x_px": press.centre_px[0], "centre_y_px": press.centre_px[1],
                          "radius_px": press.radius_px} for press in found.presses],
             "written": [str(path) for path in files.values()]}
@@ -120,6 +122,8 @@ def _lines(summary):
     yield (f"presses: {summary['presses']}; a pixel is {summary['mm_per_px']:.4g} mm ({how}), the ball {summary['ball_px']:.4g} px "
            "in radius")
     yield f"error of the shading on presses that it was not fitted to: {summary['error_levels']:.2f} grey levels in the contact"
+    yield (f"the contacts spread over {summary['covered_share']:.0%} of the image; press in its corners, too, as what lies beyond "
+           "them is extrapolated")
     yield f"{'image':28}{'column, px':>12}{'row, px':>12}{'radius, px':>12}"
     for one in summary["circles"]:
         yield f"{one['image']:28}{one['centre_x_px']:12.1f}{one['centre_y_px']:12.1f}{one['radius_px']:12.1f}"
