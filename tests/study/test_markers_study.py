@@ -224,6 +224,13 @@ def test_a_threshold_between_both_states_tells_all_but_the_small_object():
     assert verdicts_of(made_up_scores(IN_ORDER), made_up_sliding(("S",)))[name] == NOT
 
 
+def test_images_without_any_marker_tell_no_object():
+    lost = made_up_sliding().assign(change_px=np.nan)
+    judged = sliding_verdicts(lost, ["cross", "cylinder"])
+    assert set(judged.threshold_px) == {1.0}
+    assert set(wrong_objects(judged, "physics")) == set(OBJECTS)
+
+
 def test_tables_have_means_over_seeds_with_their_spread():
     rows = made_up_scores({"proposed": 100, "no_motion": 200})
     rows.loc[rows.source == "proposed", "d_px"] = rows.seed * 10.0

@@ -23,14 +23,14 @@ def sliding_verdicts(table: pd.DataFrame, trained: Sequence[str]) -> pd.DataFram
     """`table` of the sliding test with threshold_px and right (0 or 1).
 
     The paper prints no threshold. Here it lies midway, on a logarithmic scale, between the medians of free and fixed objects that
-    are trained on, or at 1 px if that is more; it is one for each source.
+    are trained on, or at 1 px if that is more; it is one for each source. Images without any marker are told wrongly.
     """
     found = []
     for _, one in table.groupby("source", sort=False):
         seen = one[one.object.isin(trained)]
-        medians = [max(float(seen.change_px[seen.state == state].median()), 0.1) for state in ("free", "fixed")]
+        medians = [max(0.1, float(seen.change_px[seen.state == state].median())) for state in ("free", "fixed")]  # 0.1 for nan
         threshold = max(1.0, float(np.sqrt(medians[0] * medians[1])))
-        told = np.where(one.change_px > threshold, "fixed", "free")
+        told = np.where(one.change_px.isna(), "unknown", np.where(one.change_px > threshold, "fixed", "free"))
         found.append(one.assign(threshold_px=threshold, right=(told == one.state).astype(int)))
     return pd.concat(found, ignore_index=True)
 

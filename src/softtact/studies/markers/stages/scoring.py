@@ -133,13 +133,13 @@ def slide_objects(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 
 def _slid(source: str, name: str, state: str, before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
-    """A row; markers that one of both images lacks are left out of the sum."""
+    """A row; markers that one of both images lacks are left out of the sum, which is nan without any."""
     known = np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1)
     return {
         "source": source,
         "seed": 0,
         "object": name,
         "state": state,
-        "change_px": marker_sum_change_px(before[known], after[known]),
+        "change_px": marker_sum_change_px(before[known], after[known]) if known.any() else np.nan,
         "markers_lost": int((~known).sum()),
     }
