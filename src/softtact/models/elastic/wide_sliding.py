@@ -39,7 +39,7 @@ _BULGE, _LEAST_MM = 1.1, 0.03   # the surface may touch where the object is belo
 _PASSES, _PASSES_WITHOUT, _HALVINGS = 4, 12, 6
 _ROUGH, _SETTLED = 10.0, 10.0
 _MOST_INCREMENTS = 2000         # of one step
-_SETTINGS = CoulombSettings(tolerance_mm=2e-4, inner_share=0.3, inner_fall=0.1)
+_SETTINGS = CoulombSettings(tolerance_mm=2e-4, inner_share=0.5, inner_fall=0.3)
 _SINGLE_MM = 2e-5               # tolerance from which products in single precision are exact enough
 
 
