@@ -64,7 +64,8 @@ def _shading(name, table, limit, made):
         best = per_press("table", circles)
         beside = {model: per_press(model, circles).mean() for model in (SMALL, "phong", WHEEL) if (own.model == model).any()}
         estimate = mean_over_objects(best)
-        others = ", ".join(f"{model} {value:.2f}" for model, value in beside.items())
+        seen = {WHEEL: " (which has seen them)"}
+        others = ", ".join(f"{model}{seen.get(model, '')} {value:.2f}" for model, value in beside.items())
         verdict = UNDECIDED if made or limit is None else below(estimate, limit)
         yield row(f"The table predicts the colours of held-out presses of {name}, {circles} circles", "shading",
                   "no limit" if limit is None else f"at most {limit:g} grey levels",

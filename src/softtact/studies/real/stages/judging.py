@@ -40,7 +40,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
         f"Markers: the gel (path {gel['path']}, distance {gel['distance_px']:.0f} px) is fitted to the first image; in other "
         "images only the ball's place, depth and motion and the camera's shift are.",
         "Shading: fitted to presses that are not among those of the scores; circles `found` use the held-out image itself to find "
-        "where the ball is, circles `labelled` do not."])
+        "where the ball is, circles `labelled` do not. The wheel's table was fitted to all presses by its authors."])
     page.claims(tables["claims"], title="Claims", file=inputs["claims"])
     page.section("Figures")
     page.figures((path, _CAPTIONS[name]) for path, name in zip(inputs["figures"], settings["names"], strict=True))
