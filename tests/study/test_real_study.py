@@ -158,14 +158,19 @@ def tables(depth_error, markers, mae):
             "ball_size": size}
 
 
-def verdicts(*numbers, made=False):
-    found = claims_of_real(tables(*numbers), limits={"s": 4.0}, made={"s": made}, markers_made=made, sheared=["shear"])
+def verdicts(*numbers, made=False, stated=20.0):
+    found = claims_of_real(tables(*numbers), limits={"s": 4.0}, made={"s": made}, stated={"s": stated}, markers_made=made,
+                           sheared=["shear"])
     return list(found.verdict)
 
 
 def test_goals_that_are_met_are_reproduced_and_others_not():
     assert verdicts(0.04, 0.2, 3.0) == [REPRODUCED] * 7
     assert verdicts(0.06, 0.6, 5.0) == [NOT] * 6 + [REPRODUCED]      # the size is found either way
+
+
+def test_a_size_that_is_not_the_stated_one_is_not_found():
+    assert verdicts(0.04, 0.2, 3.0, stated=25.0)[-1] == NOT
 
 
 def test_nothing_is_decided_on_data_that_the_study_drew_itself():

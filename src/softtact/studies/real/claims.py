@@ -14,12 +14,15 @@ MADE = "made data: nothing was measured"
 
 
 def claims_of_real(tables: Mapping[str, pd.DataFrame], *, limits: Mapping[str, float | None], made: Mapping[str, bool],
-                   markers_made: bool, sheared: list[str]) -> pd.DataFrame:
-    """Data frame with `decisions.COLUMNS`.  limits: MAE in grey levels by set;  made: sets that the study drew itself"""
+                   stated: Mapping[str, float | None], markers_made: bool, sheared: list[str]) -> pd.DataFrame:
+    """Data frame with `decisions.COLUMNS`.
+
+    limits: MAE in grey levels by set;  made: sets that the study drew itself;  stated: radius of the ball in px where it is known
+    """
     rows = [*_force(tables["gel_force"]), *_markers(tables["markers"], tables["other_markers"], markers_made, sheared)]
     for name, limit in limits.items():
         rows += _shading(name, tables["shading"], limit, made[name])
-    rows += [_size(name, own, made[name]) for name, own in tables["ball_size"].groupby("set", sort=False)]
+    rows += [_size(name, own, made[name], stated[name]) for name, own in tables["ball_size"].groupby("set", sort=False)]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
@@ -73,13 +76,17 @@ def _shading(name, table, limit, made):
                   "mean absolute error in the labelled circle", "tables/shading.csv", uncertainty=estimate.in_words(".2f"))
 
 
-def _size(name, own, made):
-    """The ball's size is found if the best size of the model with the least error lies, with its interval, inside the range."""
-    each = own.drop_duplicates("model").itertuples()
-    words = [f"{one.model} {one.best_px:.0f} px ({one.best_low_px:.0f} to {one.best_high_px:.0f})" for one in each]
+def _size(name, own, made, stated):
+    """Against the stated size where there is one; else found only if the intervals of all models agree."""
+    each = own.drop_duplicates("model")
+    words = [f"{one.model} {one.best_px:.0f} px ({one.best_low_px:.0f} to {one.best_high_px:.0f})" for one in each.itertuples()]
     best = own[own.model == own.model[own.mae.idxmin()]].iloc[0]
-    inside = bool(own.ball_px.min() < best.best_low_px and best.best_high_px < own.ball_px.max())
-    return row(f"The ball's size of {name} follows from its colours", "shading", "not stated",
-               MADE if made else "; ".join(words), UNDECIDED if made or not inside else verdict_of(True),
-               "model with the least error: the 95 % interval of its best size lies inside the range searched",
+    if stated is not None:
+        verdict = verdict_of(bool(best.best_low_px <= stated <= best.best_high_px))
+    else:
+        verdict = verdict_of(True) if each.best_low_px.max() <= each.best_high_px.min() else UNDECIDED
+    return row(f"The ball's size of {name} follows from its colours", "shading",
+               "not stated" if stated is None else f"{stated:g} px",
+               MADE if made else "; ".join(words), UNDECIDED if made else verdict,
+               "stated: in the 95 % interval of the model with the least error; not stated: the models' intervals agree",
                "tables/ball_size.csv", uncertainty="presses drawn with replacement")

@@ -78,6 +78,7 @@ class ShadingSet(Section):
         description="the wheel of PyPI, images of FOTS below the data's folder, or drawn by the study itself")
     name: str = Field("", description="of the wheel's calibration")
     ball_px: Annotated[PositiveFloat, _Assumable] = Field(description="radius of the ball")
+    stated: bool = Field(False, description="whether the ball's size is known with the data")
     thickness_px: Annotated[PositiveFloat, _Assumable] = Field(description="of the gel")
     mm_per_px: Annotated[PositiveFloat, _Assumable]
     least_mae: PositiveFloat | None = Field(

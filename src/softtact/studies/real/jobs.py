@@ -113,8 +113,10 @@ class _Jobs:
         tables = {name: self.table(name) for name in names}
         limits = {name: one.least_mae for name, one in self.values.shading.sets.items()}
         made = {name: one.source == "made" for name, one in self.values.shading.sets.items()}
+        stated = {name: one.ball_px if one.stated else None for name, one in self.values.shading.sets.items()}
         judge = Job("judge", tables, {"claims": self.table("claims")},
-                    {"limits": limits, "made": made, "markers_made": self.markers.image == "made", "sheared": self.markers.sheared})
+                    {"limits": limits, "made": made, "stated": stated,
+                     "markers_made": self.markers.image == "made", "sheared": self.markers.sheared})
         figures = [f"{self.folder}/figures/{name}.png" for name in FIGURES]
         facts = [f"{self.folder}/presses/{name}.json" for name in self.sets]
         return [judge, Job("report", {**tables, "claims": self.table("claims"), "figures": figures, "facts": facts,
