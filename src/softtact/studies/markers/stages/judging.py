@@ -119,7 +119,7 @@ _HEADS = {"d_px": "d, px", "e_px": "error vector magnitude, px", "degenerate_per
 
 def _worded(table: pd.DataFrame) -> pd.DataFrame:
     """A table with sources and columns in words; a column without any number, such as a spread over one seed, is left out."""
-    heads = {}
+    heads: dict[str, str] = {}
     for name, head in _HEADS.items():
         heads |= {name: head, f"{name}_sd": f"{head}, sd over seeds", f"printed_{name}": f"printed: {head}"}
     if "source" in table:
