@@ -96,7 +96,7 @@ def test_a_mistake_is_named_with_its_remedy():
         ("virtual_sensor", {"dead_taxels": [3, 28]}, "virtual_sensor: dead_taxels has 28; the taxels are numbered 0 to 27."),
         ("virtual_sensor", {"noise_count": 1}, "there is no key 'noise_count'; did you mean 'noise_counts'?"),
         ("sensor", "cora", "at 'sensor': there is no sensor 'cora' (did you mean 'coro'?); known are coro, digit, "),
-        ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known are neoprene, "),
+        ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known are gel_silicone, neoprene, "),
         ("materials", ["polyurethane"], "sensor coro is made of 'neoprene', which is not in the list; add it."),
         ("objects.unseen.names", ["hexagn"], "there is no object of set unseen 'hexagn'; did you mean 'hexagon'?"),
         ("objects.catalogue", "config/none.yaml", "config/none.yaml: there is no such catalogue"),

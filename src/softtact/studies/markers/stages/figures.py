@@ -169,7 +169,7 @@ def drag_sequences(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
         grey = np.repeat(data.depth_grey.values[whole][..., None], 3, axis=-1)
         name = WORDS[settings["network"]].removeprefix("the ")
         told = [
-            f"{depth:.1f} mm down, {way:.1f} mm aside, {-force:.1f} N, {share:.0%} of the contact slides"
+            f"{depth:.1f} mm down, {way:.1f} mm aside, {-force:z.1f} N, {share:.0%} of the contact slides"
             for depth, way, force, share in zip(
                 data.depth_mm.values[whole],
                 data.aside_mm.values[whole],
