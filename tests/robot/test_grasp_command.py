@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import chdir
 
 import pytest
 import trimesh
@@ -32,8 +33,8 @@ GRASP = "grasp part.stl --unit mm --force 10 --model elastic --workers 1"
 
 @pytest.fixture(scope="module")
 def first(folder):
-    os.chdir(folder)
-    assert main(f"{GRASP} --x 1 --no-picture --out first".split()) == 0
+    with chdir(folder):
+        assert main(f"{GRASP} --x 1 --no-picture --out first".split()) == 0
     return folder / "first/events.nc"
 
 
