@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """
   softtact calibrate-camera presses/ --ball-mm 4.7 --background untouched.png --out my_gel.yaml
-  softtact calibrate-camera press_*.png --ball-mm 6 --mm-per-px 0.0634 --circles circles.csv --out my_gel.yaml
+  softtact calibrate-camera press_*.png --ball-mm 6 --mm-per-px 0.063 --circles circles.csv --out my_gel.yaml
   softtact press part.stl --unit mm --sensor my_gel.yaml --motion "z -0.8" --model elastic --image part.png
 """
 

@@ -1,7 +1,7 @@
 """The readout `camera`: what a camera behind a gel sees, as images.
 
     readouts:
-      camera: {kind: camera, pixels: [320, 240], mm_per_px: 0.0634, distance_mm: 35, shading: gelsight_mini,
+      camera: {kind: camera, pixels: [320, 240], mm_per_px: 0.063, distance_mm: 35, shading: gelsight_mini,
                markers: {rows: 7, columns: 9, pitch_mm: 2.0, radius_mm: 0.35}}
 
 The pinhole and its signs: `softtact.imaging.pinhole`; what is drawn: `softtact.imaging.gel_image`; colours: a shading that

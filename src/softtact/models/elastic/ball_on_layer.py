@@ -23,6 +23,7 @@ from numpy.polynomial import legendre
 from scipy.special import j0, j1
 
 from softtact.errors import InputError
+from softtact.models.elastic.wide_layer import surface_spectrum
 
 _POINTS = 24        # of f over the contact; the equation converges exponentially, 1e-8 of the force for a <= 2 h
 _WAVES = 400        # wave numbers of the kernel
@@ -32,11 +33,7 @@ _LARGEST_X = 20.0   # g is below 1e-15 beyond
 
 def layer_over_half_space(x: np.ndarray, poisson: float) -> np.ndarray:
     """1 + g(x): normal compliance of the bonded layer over that of a half-space, at x = wave number times thickness."""
-    x = np.asarray(x, dtype=float)
-    e = np.exp(-2 * x)      # numerator and denominator are divided by exp(2 x): nothing overflows
-    top = 0.5 * (3 - 4 * poisson) * (1 - e**2) - 2 * x * e
-    bottom = 0.5 * (3 - 4 * poisson) * (1 + e**2) + (2 * x**2 + 5 - 12 * poisson + 8 * poisson**2) * e
-    return top / bottom
+    return x * surface_spectrum(x, thickness_mm=1.0, shear_mpa=1.0, poisson=poisson)[0] / (1 - poisson)
 
 
 @cache

@@ -2,8 +2,7 @@
 
 Symbols: G shear modulus, nu Poisson's ratio, h thickness, k wave number, x = k h, a contact radius, c radius that sticks.
 A wave of traction along its own direction (in plane) moves the surface by A(x) / (G k) times the traction, one across its direction
-by tanh(x) / (G k); a pressure p cos(k s) moves it along s by B(x) / (G k) p sin(k s). A and B follow from the solutions of Navier's
-equations in a layer, exp(+-k z) and z exp(+-k z), with no displacement below.
+by tanh(x) / (G k); a pressure p cos(k s) moves it along s by B(x) / (G k) p sin(k s): `wide_layer` has A and B.
 
 The traction of a ball that has stuck inside c and slid outside is Mindlin's difference of two Hertzian domes,
 q ~ sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2): exact on a half-space, an approximation on a layer of a few contact radii.
@@ -19,53 +18,27 @@ from scipy.special import j0, j1
 
 from softtact.errors import InputError
 from softtact.models.elastic.ball_on_layer import BallOnLayer
+from softtact.models.elastic.wide_layer import surface_spectrum
 
-_DEEP = 20.0        # x beyond which the layer is a half-space, to 1e-15
+_DEEP = 20.0        # x beyond which the layer is a half-space, to 1e-15: the tail begins there
 _WAVES = 200        # wave numbers up to there, and as many beyond
 _LOG_STEP, _SHARE_STEP = 0.15, 0.1      # of the grid of computed profiles
 _BEYOND = 60.0      # contact radii: wave number at which the tail ends
 
 
 def surface_kernels(poisson: float, thickness: float, contact_radius: float) -> tuple[np.ndarray, ...]:
-    """x, its weights, A and B at them (wave,): Gauss points over 0 ... 20, then the half-space's values over the tail."""
+    """x, its weights, A and B at them (wave,): Gauss points over 0 ... 20 and over the tail."""
     nodes, weights = _gauss()
     end = max(6 * _DEEP, _BEYOND * thickness / contact_radius)
-    along, push = _near(poisson)
     x = np.concatenate([0.5 * _DEEP * (nodes + 1), _DEEP + 0.5 * (end - _DEEP) * (nodes + 1)])
     weight = np.concatenate([0.5 * _DEEP * weights, 0.5 * (end - _DEEP) * weights])
-    return (x, weight, np.concatenate([along, np.full(_WAVES, 1 - poisson)]),
-            np.concatenate([push, np.full(_WAVES, -0.5 * (1 - 2 * poisson))]))
+    _, along, _, push = surface_spectrum(x, thickness_mm=1.0, shear_mpa=1.0, poisson=poisson)
+    return x, weight, x * along, x * push
 
 
 @cache
 def _gauss():
     return legendre.leggauss(_WAVES)
-
-
-@cache
-def _near(poisson):
-    """A and B (wave,) at the Gauss points over 0 ... 20."""
-    return np.array([_surface_response(x, poisson) for x in 0.5 * _DEEP * (_gauss()[0] + 1)]).T
-
-
-def _surface_response(x, nu):
-    """A and B of one wave: sideways motion of the surface, times G k, under unit traction sin(k s) and unit pressure cos(k s).
-
-    u = U sin(k s), w = W cos(k s); the four solutions at the bottom (u = w = 0) and at the top (sigma_z, tau given).
-    """
-    c = 3 - 4 * nu
-
-    def solutions(z):
-        up, down = np.exp(z), np.exp(-(z + x))      # z in 1/k: -x at the bottom, 0 at the top; down is 1 at the bottom
-        u, w = np.array([up, down, z * up, z * down]), np.array([-up, down, (c - z) * up, (c + z) * down])
-        du = np.array([up, -down, (1 + z) * up, (1 - z) * down])
-        dw = np.array([-up, -down, (c - z - 1) * up, (1 - c - z) * down])
-        return u, w, 2 * (dw + nu / (1 - 2 * nu) * (u + dw)), du - w
-
-    bottom, top = solutions(-x), solutions(0.0)
-    system = np.array([bottom[0], bottom[1], top[2], top[3]])
-    loads = np.array([[0, 0, 0, 1.0], [0, 0, -1.0, 0]]).T
-    return top[0] @ np.linalg.solve(system, loads)
 
 
 def outward(ball: BallOnLayer, radius: np.ndarray) -> np.ndarray:
