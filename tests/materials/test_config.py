@@ -55,7 +55,7 @@ def test_a_law_that_is_not_printed_is_refused_with_those_that_are(material_yaml)
 
 
 def test_an_unknown_material_is_refused_with_those_that_are_known(material_yaml):
-    with pytest.raises(InputError, match="no such material; known beside it: neoprene, polyurethane, silicone"):
+    with pytest.raises(InputError, match="no such material; known beside it: gel_silicone, neoprene, polyurethane, silicone"):
         load_material(material_yaml("rubber"))
 
 

@@ -21,6 +21,7 @@ from softtact.errors import ConvergenceError
 
 _Force = TypeVar("_Force", float, np.ndarray)
 
+_ROUNDING = 1e-12     # of squared residuals in single precision
 _AS_WIDE = 0.8    # least share of the last load step's points for which a load step starts from the last one's forces, scaled
 # Candidate points lie within REACH times the expected depth plus LEAST_REACH_MM; points within RISE times the depth may touch.
 REACH, LEAST_REACH_MM, RISE = 1.3, 0.1, 1.15
@@ -237,7 +238,8 @@ def projected_conjugate_gradients(apply: Callable[[Any], Any], precondition: Cal
         if xp.all(rho <= settings.inner_tolerance**2 * first):
             break
         q = apply(p)
-        step = xp.where(rho > 0, rho / xp.clip(_dot(p, q), min=1e-30), 0.0)
+        # A column that is solved to the rounding of single precision waits for the others: its p would have no length.
+        step = xp.where(rho > _ROUNDING * first, rho / xp.clip(_dot(p, q), min=1e-30), 0.0)
         x += step * p
         before, r = r, r - step * q
         z = project(r)

@@ -85,7 +85,7 @@ def _of_fots(folder):
     """Presses of FOTS; its background has blue and red swapped against its images."""
     table = pd.read_csv(gel_data(folder, "fots/presses.csv"))
     images = np.stack([np.asarray(Image.open(gel_data(folder, f"fots/presses/{name}"))) for name in table.image])
-    background = np.load(gel_data(folder, "fots/background.npy"))
+    background = np.load(gel_data(folder, "fots/background.npy"), allow_pickle=False)
     middle = np.median(images, axis=0)
     swapped = min((background, background[..., ::-1]), key=lambda one: float(np.abs(middle - one).mean()))
     arrays = {"images": images, "background": swapped, "centre_px": table[["centre_x_px", "centre_y_px"]].to_numpy(float),
