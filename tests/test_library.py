@@ -128,6 +128,7 @@ def test_the_costs_of_the_shipped_studies_are_printed_in_any_folder(tmp_path, mo
 
 # Extras
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("package", "arguments", "extra"), [
     ("torch", ["predict", "map.npy", "--network", "model.pt"], "learn"),
     ("optuna", ["stage", "search_hyperparameters"], "learn"),

@@ -83,6 +83,7 @@ def test_plane_rings_and_foams_are_written_as_what_they_are(tmp_path):
         assert deck.steps[0].loads == [(str(top), 2, -0.5)]
 
 
+@pytest.mark.slow
 def test_what_a_deck_cannot_say_is_refused_in_one_sentence(tmp_path):
     body = under_a_plate(rubber())
     for motion, dialect, told in [

@@ -69,6 +69,7 @@ def test_a_device_gives_energy_forces_and_tangents_of_the_compiled_loops(loops):
             np.testing.assert_allclose(K_there, K, rtol=0, atol=rounding * np.abs(K).max())
 
 
+@pytest.mark.slow
 def test_all_that_the_sums_make_lies_on_the_device_of_their_arguments():
     """Torch's `meta` device stands for a GPU here: it has no numbers, and refuses to be mixed with the processor as a GPU does."""
     e, g, m, there = 2, 27, 20, {"device": "meta", "dtype": torch.float64}

@@ -55,6 +55,7 @@ def test_each_orientation_and_law_has_its_curve_and_no_force_is_no_contact(press
     assert (state.area_per_frustum_mm2.sel(orientation="as_printed")[:, 1:] > 1.1).all()
 
 
+@pytest.mark.slow
 def test_the_virtual_dielectric_tells_of_every_frustum(pressed):
     virtual = read_dataset(pressed["virtual"])
     assert virtual.disc_area_mm2.dims == ("force", "frustum") and virtual.sizes["frustum"] == 540
@@ -64,6 +65,7 @@ def test_the_virtual_dielectric_tells_of_every_frustum(pressed):
     assert {"x_mm", "y_mm"} <= set(virtual.data_vars)
 
 
+@pytest.mark.slow
 def test_the_summary_judges_both_orientations_and_tells_what_was_measured(pressed, tmp_path):
     outputs = validated_into(tmp_path, pressed)
     summary, area, orientations = read_json(outputs["summary"]), pd.read_csv(outputs["area"]), pd.read_csv(outputs["orientations"])

@@ -25,6 +25,8 @@ from softtact.studies.hybrid.stages import (
     train_cnn,
 )
 
+pytestmark = pytest.mark.slow      # a study's training; the tiny study runs each of these stages too
+
 SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
 SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},
             "training": {"epochs": 3, "patience": 3, "batch": 8, "device": "cpu", "rates": [1e-3, 4e-3], "rate_epochs": 1},

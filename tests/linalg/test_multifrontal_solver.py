@@ -79,6 +79,7 @@ def test_triangles_and_rows_of_16_bits_hold_the_factor(workers):
         np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_solution_balances_its_right_side_to_what_16_bits_leave(workers):
     for columns in [None, 3]:
         whole, upper, places = plate(40, 30)
@@ -169,6 +170,7 @@ def round_head(x, y):
     return height, normals
 
 
+@pytest.mark.slow
 def test_a_press_ends_where_it_does_with_a_general_solver_in_double_precision():
     ends = []
     for general in (False, True):

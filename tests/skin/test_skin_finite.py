@@ -42,6 +42,7 @@ def test_the_layer_as_a_solid_has_the_skins_volume_and_nodes():
     assert layer.points is skin.layer.mesh.nodes_mm or (layer.points == skin.layer.mesh.nodes_mm).all()
 
 
+@pytest.mark.slow
 def test_a_plate_squeezes_a_layer_that_does_not_widen_as_its_test_says_and_capacitances_grow_as_the_gap_falls():
     """nu = 0, floor bonded: every column is a uniaxial test. 40 kPa on E = 200 kPa is a strain of 0.2, C is 1/0.8 of that at rest.
 

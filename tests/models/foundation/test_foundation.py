@@ -62,11 +62,13 @@ def test_movements_sideways_are_those_of_the_whole_slab(loaded, whole, complianc
         assert_close(got[axis], moved[3 * whole.top_at_map + axis], 1e-5)
 
 
+@pytest.mark.slow
 def test_membrane_forces_are_those_of_the_whole_slab(loaded, whole):
     places, load, _, _, moved = loaded
     assert_close((places.membrane() @ load).reshape(3, -1), whole.membrane(moved), 1e-5)
 
 
+@pytest.mark.slow
 def test_movements_and_tilts_of_the_roots_are_those_of_the_whole_slab(loaded, whole):
     places, load, lateral, moved, _ = loaded
     assert_close(places.lateral() @ load + places.lateral_self() @ lateral, whole.lateral @ moved, 1e-5)

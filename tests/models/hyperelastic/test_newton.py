@@ -118,6 +118,7 @@ def test_a_press_that_crawls_ends_after_the_iterations_of_a_load_step():
         next(load_steps)
 
 
+@pytest.mark.slow
 def test_a_tangent_that_nothing_makes_positive_definite_fails_the_load_step_and_is_not_tried_for_ever(monkeypatch):
     body, shifts = small_body(), []
     surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
