@@ -30,7 +30,9 @@ class MiddleOfThePlane:
 def gel(tmp_path_factory):
     """The paper's gel with points 0.25 mm apart and a readout of the plane."""
     values = yaml.safe_load(sensor_file("gelsight_wonkdim").read_text())
-    values |= {"footprint_mm": [16.0, 16.0], "map_shape": [65, 65], "readouts": {"middle": {"kind": "middle_of_the_plane"}}}
+    values |= {"footprint_mm": [16.0, 16.0], "map_shape": [65, 65]}
+    values["readouts"] = {"middle": {"kind": "middle_of_the_plane"}, "camera": values["readouts"]["camera"],
+                          "depth": values["readouts"]["depth"]}
     path = tmp_path_factory.mktemp("gel") / "gel.yaml"
     path.write_text(yaml.safe_dump(values))
     return softtact.load_sensor(path)
@@ -50,6 +52,18 @@ def test_a_motion_gives_displacement_traction_slip_and_force(sheared):
     assert (np.diff(sheared.contact_area_mm2[:3]) > 0).all() and (sheared.within_validity == 1).all()
     np.testing.assert_allclose(sheared.indentation_mm, [0.2, 0.4, 0.6, 0.6, 0.6, 0.6])
     np.testing.assert_array_equal(sheared.deformation_map_mm, -sheared.displacement_mm[..., 2])
+
+
+def test_the_depth_image_moves_with_the_object_and_does_not_fold_where_it_drags_the_surface(sheared):
+    """The cap of the ball, 0.6 mm deep, seen 0.4 mm aside, nearer by 35 / 34.4; the surface's points are dragged from under it."""
+    depth, still, moved = sheared.readings["depth"].values, *sheared.readings["depth"].values[[2, 4]]
+    assert depth.shape == (6, 256, 256) and moved.max() == pytest.approx(0.6, abs=0.01)
+    assert (moved > 0).sum() == pytest.approx((still > 0).sum(), rel=0.02)
+    columns = np.arange(256)
+    shift = np.diff([(one.sum(axis=0) * columns).sum() / one.sum() for one in (still, moved)])[0]
+    assert shift * 0.0625 == pytest.approx(0.4 * 35 / (35 - 0.3), abs=0.02)      # 0.3 mm: the cap's mean depth
+    above = (moved > 0.05)[int((moved.sum(axis=1) * columns).sum() / moved.sum())]
+    assert np.abs(np.diff(above.astype(int))).sum() == 2                           # one piece
 
 
 def test_readouts_see_the_plane_at_rest_and_pressed(gel, sheared):

@@ -221,12 +221,12 @@ class DenseBlock:
 
 @dataclass(frozen=True)
 class Increment:
-    """Gaps, displacements and loads prescribed for one increment at contact points (c,)."""
+    """Gaps, displacements and loads prescribed for one increment at contact points (c,), or at the points of a grid (ny, nx)."""
 
     gap: np.ndarray
     """The object's height (c,) in mm over the undeformed surface, at depth 0."""
     carried: np.ndarray
-    """(c, 2) in mm: tangential displacement of a point that sticks."""
+    """(c, 2) in mm, on a grid (2, ny, nx): tangential displacement of a point that sticks."""
     friction: float
     """Coulomb's coefficient; infinite: every touching point sticks."""
     depth: float | None = None

@@ -4,6 +4,8 @@ The camera's rays are followed from the deepest plane up to the surface at rest.
 that of the underside, found by halving intervals. Exact to the triangles up to half a pixel; no graphics library is needed.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import trimesh
 from numba import njit
@@ -13,6 +15,42 @@ from softtact.imaging.pinhole import Pinhole
 
 _FINER = 2           # points of the underside for each pixel of the surface at rest
 _HALVINGS = 12       # of the deepest depth: 3 mm to 0.7 um
+
+
+@dataclass(frozen=True)
+class MovedObject:
+    """A rigid object and where it is at each step of a motion."""
+
+    mesh: trimesh.Trimesh
+    """In mm, in the sensor's frame, placed as at the motion's start."""
+    first_touch_mm: float
+    """Height of its point that touches first over the surface at rest."""
+    aside_mm: np.ndarray
+    """(step, 2): its displacement along x and y."""
+    down_mm: np.ndarray
+    """(step,): its depth from first touch."""
+    turned_deg: np.ndarray
+    """(step,): its rotation about the vertical through `about_mm`, before it moves aside."""
+    about_mm: tuple[float, float] = (0.0, 0.0)
+    """x and y of that vertical."""
+
+    def depths_mm(self, pinhole: Pinhole, *, deepest_mm: float) -> np.ndarray:
+        """(step, row, column), single precision: depth below the surface at rest that a camera sees, 0 to the deepest."""
+        cameras: dict[float, DepthCamera] = {}
+        reach = float(np.abs(self.aside_mm).max())
+        images = np.empty((len(self.down_mm), pinhole.rows, pinhole.columns), dtype=np.float32)
+        for step, (down, aside, angle) in enumerate(zip(self.down_mm, self.aside_mm, self.turned_deg, strict=True)):
+            if angle not in cameras:
+                cameras[angle] = DepthCamera(self._turned(angle), pinhole, deepest_mm=deepest_mm, reach_mm=reach,
+                                             first_touch_mm=self.first_touch_mm)
+            images[step] = cameras[angle].image(down, aside)
+        return images
+
+    def _turned(self, angle_deg):
+        if not angle_deg:
+            return self.mesh
+        turn = trimesh.transformations.rotation_matrix(np.radians(angle_deg), [0, 0, 1], [*self.about_mm, 0])
+        return self.mesh.copy().apply_transform(turn)
 
 
 class DepthCamera:

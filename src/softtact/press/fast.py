@@ -15,6 +15,7 @@ from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
+from softtact.imaging.depth_image import MovedObject
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
@@ -226,9 +227,9 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cont
                              limit_s=control.time_limit_s)
     except ConvergenceError as error:
         if isinstance(before := error.result, ElasticMotion):
-            control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds))
+            control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds, placed, motion))
         raise
-    found = _of_motion(sensor, moved, seconds)
+    found = _of_motion(sensor, moved, seconds, placed, motion)
     if not _between_nodes(sensor, HeightField(placed)):
         return found
     warnings.warn("The object has walls or pins that fall between the points of the elastic model's surface in some places of the "
@@ -268,10 +269,13 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
                          deepest_mm=spec.thickness_mm, on_step=note)
 
 
-def _of_motion(sensor, moved, seconds):
-    """The result of an `ElasticMotion`."""
+def _of_motion(sensor, moved, seconds, placed, motion):
+    """The result of an `ElasticMotion` of a placed mesh along a `Motion`, or of its first steps."""
     unknown, spec = np.full(len(moved.depth_mm), np.nan), sensor.spec
-    plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, moved.displacement_mm, moved.traction_mpa, moved.slides, moved.gap_mm)
+    touch = HeightField(placed).first_touch_mm(spec.map_x_mm, spec.map_y_mm)
+    followed = MovedObject(placed, touch, motion.aside_mm[:len(unknown)], moved.depth_mm, np.zeros(len(unknown)))
+    plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, moved.displacement_mm, moved.traction_mpa, moved.slides, moved.gap_mm,
+                        followed)
     attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}
     result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
                          np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,

@@ -14,6 +14,7 @@ from trimesh import Trimesh
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, InputError
+from softtact.imaging.depth_image import MovedObject
 from softtact.models.elastic.wide_layer import WideLayer
 from softtact.models.elastic.wide_motion import follow_motion
 from softtact.models.elastic.wide_sliding import WideObject, WideStep
@@ -49,11 +50,16 @@ def press_gel(sensor: "Sensor", placed: Trimesh, given: np.ndarray | Motion, con
     spec, surface, layer = sensor.spec, HeightField(placed), sensor.prepared("elastic")
     touch = surface.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
     _refuse_leaving(spec, surface, touch, motion)
-    middle = placed.bounds.mean(axis=0)
+    about = tuple(placed.bounds.mean(axis=0)[:2].tolist())
     mover = WideObject(layer, surface, (spec.map_x_mm, spec.map_y_mm), first_touch_mm=touch, friction=spec.friction.object,
-                       about_mm=(float(middle[0]), float(middle[1])))
+                       about_mm=about)
     watch, start = Watch(control.label, limit_s=control.time_limit_s), time.perf_counter()
     seconds: list[float] = []
+
+    def result_of(steps: Sequence[WideStep]) -> PressResult:
+        position = np.stack([step.position for step in steps])
+        moved = MovedObject(placed, touch, position[:, :2], position[:, 2], np.array([step.turned_deg for step in steps]), about)
+        return gel_result(sensor, steps, seconds, moved)
 
     def note(step: WideStep) -> None:
         watch.report(f"step {len(seconds) + 1} of {len(motion.steps)}, {step.position[2]:.3f} mm deep")
@@ -63,23 +69,23 @@ def press_gel(sensor: "Sensor", placed: Trimesh, given: np.ndarray | Motion, con
         steps = follow_motion(mover, motion, deepest_mm=spec.thickness_mm, on_step=note)
     except ConvergenceError as error:
         if isinstance(before := error.result, list):
-            control.reached.keep(seconds, lambda: gel_result(sensor, before, seconds))
+            control.reached.keep(seconds, lambda: result_of(before))
         raise
     if not any(step.normal.any() for step in steps):
         raise InputError(f"The object never touches {spec.name} in this motion, which begins at first touch; move it down, for "
                          'example by "z -0.5".')
-    return gel_result(sensor, steps, seconds)
+    return result_of(steps)
 
 
-def gel_result(sensor: "Sensor", steps: Sequence[WideStep], seconds: Sequence[float]) -> PressResult:
-    """The result of steps on a gel and the wall-clock times (s) of each."""
+def gel_result(sensor: "Sensor", steps: Sequence[WideStep], seconds: Sequence[float], moved: MovedObject) -> PressResult:
+    """The result of steps on a gel, the wall-clock times (s) of each, and the object's places at them."""
     spec, unknown = sensor.spec, np.full(len(steps), np.nan)
     area = float(np.prod([line[1] - line[0] for line in (spec.map_x_mm, spec.map_y_mm)]))
     fields = {name: np.stack([getattr(step, name) for step in steps]) for name in
               ("displacement_mm", "force_n", "path_mm", "slides", "gap_mm")}
     force = fields["force_n"].sum(axis=(1, 2))
     plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, fields["displacement_mm"], fields["force_n"] / area, fields["slides"],
-                        fields["gap_mm"])
+                        fields["gap_mm"], moved)
     depth, touching = np.array([step.position[2] for step in steps]), np.array([int((step.normal > 0).sum()) for step in steps])
     numbers: dict[str, Any] = {
         "displacement_mm": plane.displacement_mm, "force_n": force, "torque_nmm": _torques(spec, fields["force_n"]),

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 class Depth(FiniteSection):
     """(step, y, x) in mm: depth of the object that each pixel of a camera sees, 0 to max_mm, as if the gel were not there.
 
-    0 beside the object; nan where a model does not give the gap to the object. `grey` makes an image of it.
+    By a z-buffer of the object where its mesh is known; else at the points of the surface, from their gaps to it: these fold where
+    the object drags them far. 0 beside the object; nan where a model gives neither. `grey` makes an image of it.
     """
 
     max_mm: Length
@@ -33,6 +34,8 @@ class Depth(FiniteSection):
     def read(self, surface: SurfaceMotion) -> "xarray.DataArray":
         """See `Depth`. Raises InputError where the sensor has no such camera."""
         pinhole = camera_of(surface.spec, self.camera).pinhole
+        if surface.plane is not None and surface.plane.object is not None:
+            return labelled(surface.plane.object.depths_mm(pinhole, deepest_mm=self.max_mm), ("step", "y", "x"), units="mm")
         images = []
         for relief, depth in zip(reliefs(surface), object_depths(surface), strict=True):
             depth = np.clip(depth, 0.0, self.max_mm)

@@ -28,6 +28,8 @@ from softtact.unknown_names import first_fault, nearest
 if TYPE_CHECKING:
     import xarray
 
+    from softtact.imaging.depth_image import MovedObject
+
 _KINDS: dict[str, type] = {}
 _Class = TypeVar("_Class", bound=type)
 
@@ -61,6 +63,8 @@ class PlaneMotion:
     gap_mm: np.ndarray
     """(step, ny, nx): along z to the object, whose underside is at displacement z + gap; 0 in contact up to the solver's tolerance,
     inf where no object is above."""
+    object: "MovedObject | None" = None
+    """What presses, and where it is at each step; None where there is none, or the model does not tell."""
 
     @classmethod
     def at_rest(cls, x_mm: np.ndarray, y_mm: np.ndarray) -> "PlaneMotion":

@@ -14,31 +14,11 @@ import numpy as np
 from numba import njit
 from scipy import fft
 
-from softtact.contact.coulomb import CoulombSettings, Relaxation, largest_eigenvalue, solve_in_discs
+from softtact.contact.coulomb import CoulombSettings, Increment, Relaxation, largest_eigenvalue, solve_in_discs
 from softtact.errors import ConvergenceError
 from softtact.models.elastic.wide_layer import GridOperator
 
 _FALL = 0.1             # of a residual, before the active set or the other problem gets its turn
-
-
-@dataclass(frozen=True)
-class GridIncrement:
-    """Gaps, displacements and loads prescribed for one increment at the points of a grid (ny, nx)."""
-
-    gap: np.ndarray
-    """(ny, nx) in mm: the object's height over the undeformed surface, at depth 0."""
-    carried: np.ndarray
-    """(2, ny, nx) in mm: displacement aside of a point that sticks."""
-    friction: float
-    """Coulomb's coefficient."""
-    depth: float | None = None
-    """Prescribed depth in mm, or None where `load` is prescribed."""
-    load: float | None = None
-    """Prescribed normal force in N, or None where `depth` is prescribed."""
-
-    def bound(self, normal: np.ndarray) -> np.ndarray:
-        """The largest tangential forces (ny, nx) in N at normal forces (ny, nx)."""
-        return self.friction * normal if np.isfinite(self.friction) else np.where(normal > 0, np.inf, 0.0)
 
 
 @dataclass(frozen=True)
@@ -136,7 +116,7 @@ class GridSolver:
         self._stencil = Stencil3(operator)
         self._tangential = _Tangential(operator, self._stencil)
 
-    def solve(self, increment: GridIncrement, normal: np.ndarray, tangential: np.ndarray, *, rough: float = 1.0) -> GridContact:
+    def solve(self, increment: Increment, normal: np.ndarray, tangential: np.ndarray, *, rough: float = 1.0) -> GridContact:
         """The contact of an increment, from first guesses `normal` (ny, nx) and `tangential` (2, ny, nx) in N.
 
         rough: factor of the settings' tolerance

@@ -11,7 +11,7 @@ half of the nodes' spacing (so that the object skips no node, and each node stic
 of at most an eighth of it. Without friction there is no history, and each step is one increment.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -309,7 +309,7 @@ def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray
     states, counts, load = [mover.start], [], None
     try:
         for number, step in enumerate(motion.steps, start=1):
-            load = _load_after(step, load)
+            load = load_after(step, load)
             state, count = _follow_step(mover, states[-1], step, load)
             if state.position[2] > deepest_mm:
                 raise ConvergenceError(f"Step {number} was not reached: the object would be {state.position[2]:.3g} mm deep in a "
@@ -324,22 +324,25 @@ def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray
     return _result(mover, states, counts)
 
 
-def check_motion(motion: Motion) -> None:
-    """Raise InputError for what the elastic model does not know."""
+def check_motion(motion: Motion, *, prescribed: Sequence[str] = ("x", "y", "z"), refused: str = _REFUSED) -> None:
+    """Raise InputError for what an elastic model does not know.
+
+    prescribed: freedoms that it prescribes;  refused: the sentence, with {} for what it does not bear
+    """
     if not motion.steps:
         raise InputError("The motion has no steps; add one, for example with Motion().press(force_n=5).")
     for number, step in enumerate(motion.steps, start=1):
-        turned = [name for name in step.ways if name not in ("x", "y", "z")]
+        turned = [name for name in step.ways if name not in prescribed]
         loaded = [name for name in step.loads if name != "z"]
         if turned or loaded:
             what = f"the rotation {turned[0]}" if turned else f"the load on {loaded[0]}"
-            raise InputError(f"Step {number} of the motion: {_REFUSED.format(what)}")
+            raise InputError(f"Step {number} of the motion: {refused.format(what)}")
         if step.loads.get("z", -1.0) >= 0:
             raise InputError(f"Step {number} of the motion: a load of {step.loads['z']:g} N along z does not press; give one "
                              "below 0, or prescribe z.")
 
 
-def _load_after(step: MotionStep, load: float | None) -> float | None:
+def load_after(step: MotionStep, load: float | None) -> float | None:
     """The normal load (N, positive) at a step's end, or None where the depth is prescribed."""
     if "z" in step.loads:
         return -step.loads["z"]

@@ -19,12 +19,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from softtact.contact.coulomb import CoulombSettings
+from softtact.contact.coulomb import CoulombSettings, Increment
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.motion import MotionStep
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
-from softtact.models.elastic.grid_contact import GridContact, GridIncrement, GridSolver
+from softtact.models.elastic.grid_contact import GridContact, GridSolver
 from softtact.models.elastic.wide_layer import WideLayer
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -383,7 +383,7 @@ class _Move:
             self.gap = np.where(allowed, heights, NO_CONTACT_MM) if (heights[allowed] < 0.5 * NO_CONTACT_MM).any() else heights
             share = self._share(expected)
             carried = state.moved + share * self.way + (1 - share) * self.trend[:2]
-            increment = GridIncrement(self.gap, carried, mover.friction, self.depth, self.load)
+            increment = Increment(self.gap, carried, mover.friction, self.depth, self.load)
             found = solver.solve(increment, *self._guess(guess), rough=rough)
             self.place, expected = self._places(found), found.depth
             heights, guess, allowed = mover.heights(self.place), (found.normal, found.tangential), np.ones_like(self.touched)

@@ -18,11 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
-from softtact.geometry.meshes import place
-from softtact.imaging.depth_image import DepthCamera
-from softtact.readout.camera import camera_of
 from softtact.readout.depth import grey
 from softtact.studies.markers.paths import Path, SequencePlan, pose_on_sensor
 
@@ -76,7 +72,7 @@ Maker = Callable[["trimesh.Trimesh", SequencePlan, Path], Frames]
 
 
 def press_frames(sensor: "Sensor", mesh: "trimesh.Trimesh", plan: SequencePlan, path: Path) -> Frames:
-    """The `Frames` of a sequence, by the elastic model; depth images are a z-buffer of the mesh."""
+    """The `Frames` of a sequence, by the elastic model."""
     pose = pose_on_sensor(plan.x_mm, plan.y_mm, plan.angle_deg)
     result = sensor.press(mesh, pose=pose, motion=plan.motion(path), model="elastic")
     rest = rest_readings(sensor)
@@ -84,7 +80,7 @@ def press_frames(sensor: "Sensor", mesh: "trimesh.Trimesh", plan: SequencePlan, 
     places = [np.stack([read["markers"][f"{axis}_mm"].values for axis in "xyz"], axis=-1) for read in (rest, result.readings)]
     slid = np.nan_to_num(result.slip)
     return Frames(
-        depth_mm=depth_images(sensor, place(mesh, pose=pose), result.indentation_mm, plan.motion(path).aside_mm),
+        depth_mm=_after_rest(result.readings["depth"].values),
         image=image,
         marker_px=px,
         marker_mm=np.concatenate(places),
@@ -95,18 +91,6 @@ def press_frames(sensor: "Sensor", mesh: "trimesh.Trimesh", plan: SequencePlan, 
         x_mm=sensor.spec.map_x_mm,
         y_mm=sensor.spec.map_y_mm,
     )
-
-
-def depth_images(sensor: "Sensor", placed: "trimesh.Trimesh", down_mm: np.ndarray, aside_mm: np.ndarray) -> np.ndarray:
-    """(1 + step, row, column) in mm: the depth of an object at rest and at each step, as the sensor's camera would see it.
-
-    down_mm (step,) from first touch, aside_mm (step, 2): the object's displacements
-    """
-    aside = np.vstack([np.zeros((1, 2)), aside_mm])
-    touch = HeightField(placed).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
-    camera = DepthCamera(placed, camera_of(sensor.spec, "camera").pinhole, deepest_mm=deepest_mm(sensor.spec),
-                         reach_mm=float(np.abs(aside).max()), first_touch_mm=touch)
-    return np.stack([camera.image(down, way) for down, way in zip([0.0, *down_mm], aside, strict=True)])
 
 
 def deepest_mm(spec: Any) -> float:

@@ -19,7 +19,7 @@ from softtact.errors import InputError
 from softtact.evaluation.image_scores import motion_error_px, position_error_px
 from softtact.files import write_csv
 from softtact.studies.markers.paths import pose_on_sensor
-from softtact.studies.markers.pressing import deepest_mm, depth_images, rest_readings
+from softtact.studies.markers.pressing import deepest_mm, rest_readings
 from softtact.studies.markers.stages.data import sensor_with
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def compare_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings
     outputs: table (CSV: source, d_px, e_px), places (optional CSV: each marker's real and solved place)
     settings: pose [x mm, y mm, angle deg] of the sensor over the object, motion of the object on the sensor, friction (optional)
     """
-    from softtact.geometry.meshes import place, read_mesh
+    from softtact.geometry.meshes import read_mesh
 
     sensor = sensor_with(inputs["sensor"], settings.get("friction"))
     mesh, pose, motion = read_mesh(inputs["mesh"], unit="mm"), pose_on_sensor(*settings["pose"]), Motion.parse(settings["motion"])
@@ -45,7 +45,8 @@ def compare_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings
     made = result.readings["markers"].values[-1] - rest + real_rest
     sources = {"no_motion": (real_rest, real_rest), "physics": (made, real_rest)}
     if "generator" in inputs:
-        depth = depth_images(sensor, place(mesh, pose=pose), result.indentation_mm, motion.aside_mm)
+        depth = result.readings["depth"].values
+        depth = np.concatenate([np.zeros_like(depth[:1]), depth])      # at rest the object just touches
         sources["network"] = _generated(sensor, inputs["generator"], depth, rest, threads)
     write_csv(outputs["table"], pd.DataFrame([
         {"source": name, "d_px": float(position_error_px(places, real)),
