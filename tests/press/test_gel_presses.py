@@ -66,6 +66,16 @@ def test_the_depth_image_moves_with_the_object_and_does_not_fold_where_it_drags_
     assert np.abs(np.diff(above.astype(int))).sum() == 2                           # one piece
 
 
+def test_the_depth_image_turns_as_the_contact_does(gel):
+    """A bar along x that turns by 30 degrees lies along y = x tan 30 in the image and under the pressure on the moved points."""
+    turned = gel.press(trimesh.creation.box((6.0, 2.0, 2.0)), motion="z -0.3; rz 30", label="")
+    moved = np.meshgrid(turned.x_mm, turned.y_mm) + np.moveaxis(turned.displacement_mm[-1, ..., :2], -1, 0)
+    pixels = np.meshgrid(np.arange(256), np.arange(256))
+    for places, weight in ((pixels, turned.readings["depth"].values[-1]), (moved, -turned.traction_mpa[-1, ..., 2])):
+        (xx, xy), (_, yy) = np.cov(*(place.ravel() for place in places), aweights=weight.ravel())
+        assert np.degrees(0.5 * np.arctan2(2 * xy, xx - yy)) == pytest.approx(30, abs=3)
+
+
 def test_readouts_see_the_plane_at_rest_and_pressed(gel, sheared):
     middle = sheared.readings["middle"].values
     np.testing.assert_allclose(middle[:, :3], sheared.displacement_mm[:, 32, 32])

@@ -222,7 +222,7 @@ def _larger_areas(rows: pd.DataFrame) -> dict[str, str]:
 def _levels(rows: pd.DataFrame) -> dict[str, str]:
     claim, rule = (
         "The proposed network has the smallest d at every deformation",
-        "of the networks, at every depth and way aside scored",
+        "of the networks, at every depth and displacement aside scored",
     )
     networks = [name for name in ("proposed", "no_lstm", "pix2pix") if name in set(rows.source)]
     if len(networks) < 2 or "proposed" not in networks:

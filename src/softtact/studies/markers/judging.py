@@ -14,7 +14,7 @@ def by_object(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_motion(rows: pd.DataFrame) -> pd.DataFrame:
-    """A row for each source, depth and way aside: means of d_px and mse over all objects."""
+    """A row for each source, depth and displacement aside: means of d_px and mse over all objects."""
     rounded = rows.assign(depth_mm=rows.depth_mm.round(3), aside_mm=rows.aside_mm.round(3))
     return rounded.groupby(["source", "depth_mm", "aside_mm"], sort=False)[["d_px", "mse"]].mean().reset_index()
 

@@ -85,7 +85,7 @@ class SequencePlan:
         return Motion().press(depth_mm=list(self.depth_mm * (1 + np.arange(down)) / down)).slide(**ways, steps=across)
 
     def moved_mm(self, path: Path) -> np.ndarray:
-        """(frame, 2) depth and way aside of each frame, the first at rest."""
+        """(frame, 2) depth and displacement aside of each frame, the first at rest."""
         down, across = path.steps(self.depth_mm), path.steps(path.aside_mm)
         depth = self.depth_mm * np.minimum(np.arange(1 + down + across), down) / down
         return np.column_stack([depth, path.aside_mm * np.maximum(np.arange(1 + down + across) - down, 0) / across])

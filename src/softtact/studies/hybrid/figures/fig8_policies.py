@@ -16,7 +16,7 @@ _BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
 _ABOVE = {"xytext": (5, 5), "ha": "left", "va": "bottom"}
 # For each kind of policy: mark, colour, meaning and position of its texts, below or above so that near ones do not overlap.
 _KINDS = {"always": ("s", "0.45", "always the same model", _BELOW), "paper": ("D", "#b22222", "the paper's rule", _ABOVE),
-          "random": ("X", "#8a5a9e", "a random choice of the rule's share", _BELOW),
+          "random": ("X", "#8a5a9e", "a random choice of the rule's share", _ABOVE),
           "error": ("o", "#1f7a4d", "by expected error, tolerance of", _ABOVE)}
 
 
@@ -37,7 +37,7 @@ def _draw_policies(axes, policies):
                   label=meaning)
         for place, names in _places(rows, width=0.05 * highest).items():
             axes.annotate(names, place, **beside, textcoords="offset points", fontsize=8, color=colour)
-    axes.set(xscale="log", xlabel="time per press, s", ylabel="mean error of the maps, um", ylim=(-0.1 * highest, 1.12 * highest),
+    axes.set(xscale="log", xlabel="time per press, s", ylabel="mean error of the maps, um", ylim=(-0.1 * highest, 1.45 * highest),
              title=f"{policies.presses.iloc[0]} presses that were not calibrated on")
     axes.margins(x=0.2)
     axes.legend(frameon=False, fontsize=8, loc="upper right")

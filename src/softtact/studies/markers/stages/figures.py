@@ -52,8 +52,8 @@ def draw_examples(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
         at = whole[frame]
         axes[0, k].imshow(data.depth_grey.values[at], cmap="gray", vmin=0, vmax=255)
         axes[0, k].set_title(
-            f"{data.object.values[at]}\n{data.depth_mm.values[at]:.1f} mm down, {data.aside_mm.values[at]:.1f} "
-            f"{data.aside.values[at]}",
+            f"{data.object.values[at]}\n{data.depth_mm.values[at]:.1f} mm down, "
+            f"{data.aside_mm.values[at]:.1f} mm along {data.aside.values[at]}",
             fontsize=7,
         )
         axes[1, k].imshow(data.image.values[at])
@@ -69,7 +69,10 @@ def draw_examples(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 
 def draw_positions(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Figure 8: d of each object, and over depth and way aside.  inputs: scores (CSV);  settings: sources, trained (objects)."""
+    """Figure 8: d of each object, and over depth and displacement aside.
+
+    inputs: scores (CSV);  settings: sources, trained (objects)
+    """
     _draw_scores(inputs, outputs, settings, "d_px")
 
 
@@ -108,7 +111,7 @@ def _draw_scores(inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
             line = chosen.sort_values(axis)
             place.plot(line[axis], line[score], "o-", ms=3, color=COLOURS[source])
     down.set(xlabel="depth, mm", title="pressed down")
-    aside.set(xlabel="way aside, mm", title=f"then aside, at {deepest:g} mm")
+    aside.set(xlabel="displacement aside, mm", title=f"then aside, at {deepest:g} mm")
     for place in (bars, down, aside):
         place.set_ylim(bottom=0)
     bars.legend(frameon=False, fontsize=7, ncols=2)
@@ -133,11 +136,14 @@ def draw_sliding(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
             place.semilogy(
                 np.arange(len(names)), values, marker, ms=5, mfc="none" if state == "free" else colour, color=colour, label=state
             )
-        place.axhline(one.threshold_px.iloc[0], color="0.5", lw=0.8, ls="--", label="threshold")
+        if one.change_px.notna().any():
+            place.axhline(one.threshold_px.iloc[0], color="0.5", lw=0.8, ls="--", label="threshold")
+        else:
+            place.text(0.5, 0.5, "no image shows all markers", transform=place.transAxes, ha="center", fontsize=8)
         place.set_xticks(np.arange(len(names)), names, rotation=60, ha="right", fontsize=7)
         place.set_title(WORDS[source])
     axes[0, 0].set_ylabel("change of the summed motion, px")
-    axes[0, 0].legend(frameon=False, fontsize=8)
+    axes[0, -1].legend(frameon=False, fontsize=8)
     save(figure, *outputs.values())
 
 
