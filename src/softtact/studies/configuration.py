@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.sensors.library import sensor_file
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 SHIPPED = Path(str(resources.files("softtact.studies"))) / "data"     # a copy of the project's config/
@@ -23,6 +24,11 @@ def here_or_shipped(path: str | Path) -> Path:
         return path
     shipped = SHIPPED.joinpath(*path.parts[1:])
     return shipped if shipped.exists() else path
+
+
+def found_sensor(name: str | Path) -> Path:
+    """The file of a configuration's sensor; it ships with the package where the working folder has none of its name."""
+    return here_or_shipped(sensor_file(name))
 
 
 def read_mapping(path: str | Path) -> dict[str, Any]:

@@ -14,8 +14,7 @@ from softtact.learning.settings import Share
 from softtact.readout.ssim import check_window
 from softtact.sensors.fields import plain_value
 from softtact.sensors.frusta import SensorSpec
-from softtact.sensors.library import sensor_file
-from softtact.studies.configuration import here_or_shipped, read_mapping, read_over, refuse_unknown, validated
+from softtact.studies.configuration import found_sensor, here_or_shipped, read_mapping, read_over, refuse_unknown, validated
 from softtact.studies.hybrid.keys import CatalogueEntry, Forces, Fraction, Law, Name, NotNegative, VirtualSensorKey
 from softtact.studies.hybrid.objects import read_catalogue
 from softtact.unknown_names import Section
@@ -232,7 +231,7 @@ def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> Dec
     """
     where = str(path or "the configuration")
     checked = validated(DecideValues, read_mapping(DEFAULT) | dict(values), where=where)
-    spec = SensorSpec.from_yaml(found_sensor(checked))
+    spec = SensorSpec.from_yaml(found_sensor(checked.sensor))
     spec.check_for("foundation")
     check_window(checked.ssim_window, (spec.taxels.rows, spec.taxels.columns))
     low, high = spec.force_range_n
@@ -241,10 +240,6 @@ def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> Dec
                          f"of {spec.name}, {low:g} to {high:g} N; leave out what is beyond.")
     return DecideStudy(checked, spec, _indenters(checked, read_catalogue(here_or_shipped(checked.catalogue)), where))
 
-
-def found_sensor(values: DecideValues) -> Path:
-    """The sensor's file, which ships with the package where the working folder has none of its name."""
-    return here_or_shipped(sensor_file(values.sensor))
 
 
 def _indenters(values: DecideValues, catalogue: Mapping[str, CatalogueEntry], where: str) -> list[DecideItem]:

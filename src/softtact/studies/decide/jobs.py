@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from softtact.sensors.library import material_file
-from softtact.studies.decide.config import HYPERELASTIC, MATCHED, MODELS, DecideItem, DecideStudy, Pressing, found_sensor
+from softtact.studies.configuration import found_sensor
+from softtact.studies.decide.config import HYPERELASTIC, MATCHED, MODELS, DecideItem, DecideStudy, Pressing
 from softtact.studies.jobs import Job, figure_files, from_here
 
 TABLES = ("scores", "hypotheses", "learning_curve", "power", "robustness", "collapse")
@@ -39,7 +40,7 @@ class _Jobs:
         self.study, self.values, self.folder = study, study.values, folder
         self.items = [*study.indenters, *study.objects]
         self.forces = list(study.values.forces_n)
-        self.sensor = {"sensor": from_here(found_sensor(study.values))}
+        self.sensor = {"sensor": from_here(found_sensor(study.values.sensor))}
         self.pressing = self.sensor | {"materials": [from_here(material_file(name)) for name in study.spec.materials.values()]}
 
     def mesh(self, item: DecideItem) -> str:

@@ -13,9 +13,8 @@ from softtact.errors import InputError
 from softtact.learning.image_settings import NETWORKS, ImageTraining
 from softtact.readout.camera import camera_of
 from softtact.sensors.fields import plain_value
-from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
-from softtact.studies.configuration import here_or_shipped, read_mapping, read_over, validated
+from softtact.studies.configuration import found_sensor, read_mapping, read_over, validated
 from softtact.studies.hybrid.keys import Name, NotNegative
 from softtact.studies.markers import paths
 from softtact.studies.markers.pressing import deepest_mm
@@ -188,7 +187,7 @@ def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> Mar
     """
     where = str(path or "the configuration")
     checked = validated(MarkerValues, read_mapping(DEFAULT) | dict(values), where=where)
-    spec = read_spec(found_sensor(checked))
+    spec = read_spec(found_sensor(checked.sensor))
     missing = [name for name in ("camera", "markers", "depth") if name not in spec.stated_readouts]
     if missing:
         raise InputError(
@@ -199,7 +198,3 @@ def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> Mar
         raise InputError(f"{where}, at 'sensor': the camera of {spec.name} sees no markers; add them to its readout camera.")
     return MarkerStudy(checked, spec)
 
-
-def found_sensor(values: MarkerValues) -> Path:
-    """The sensor's file, which ships with the package where the working folder has none of its name."""
-    return here_or_shipped(sensor_file(values.sensor))

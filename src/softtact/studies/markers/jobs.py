@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from softtact.sensors.library import material_file
+from softtact.studies.configuration import found_sensor
 from softtact.studies.jobs import Job, figure_files, from_here
-from softtact.studies.markers.config import MarkerStudy, found_sensor
+from softtact.studies.markers.config import MarkerStudy
 from softtact.studies.markers.paths import TRAIN, SequencePlan
 from softtact.studies.markers.stages.data import plan_values
 
@@ -36,7 +37,7 @@ class _Jobs:
     def __init__(self, study: MarkerStudy, folder: str) -> None:
         self.study, self.values, self.folder = study, study.values, folder
         self.pressed_with = {
-            "sensor": from_here(found_sensor(study.values)),
+            "sensor": from_here(found_sensor(study.values.sensor)),
             "materials": [from_here(material_file(name)) for name in study.spec.materials.values()],
         }
         self.parts = list(self._parts())
