@@ -13,6 +13,8 @@ MOST_LINES = 500
 ORDER = (
     ("errors",),
     ("unknown_names", "progress", "devices"),
+    ("checksums", "inputs"),
+    ("outputs",),
     ("files", "drawing"),
     ("tables",),
     ("linalg", "geometry", "materials"),

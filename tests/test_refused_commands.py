@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from softtact.cli import main
 from softtact.errors import InputError
-from softtact.files import parse_json, read_yaml, refuse_overwriting
+from softtact.files import parse_json, read_yaml
+from softtact.outputs import refuse_overwriting
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import read_spec
 from softtact.studies.__main__ import main as stage_main

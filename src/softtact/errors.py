@@ -10,13 +10,24 @@ EXTRAS = {"snakemake": "workflow", "jinja2": "workflow", "torch": "learn", "optu
 class SofttactError(Exception):
     """Base of all errors that a user can act upon."""
 
+    status = 1
+    """Exit status of a command that it ends."""
+
 
 class InputError(SofttactError):
     """A file, a field or an argument is not usable as given."""
 
 
+class UnreadableError(InputError):
+    """A file exists, and the system does not let us read it."""
+
+    status = 4
+
+
 class OutputError(SofttactError):
     """A file cannot be written: the disk is full, or its folder is not writable."""
+
+    status = 4
 
 
 class ConvergenceError(SofttactError):
@@ -24,6 +35,8 @@ class ConvergenceError(SofttactError):
 
     result: what was reached before (a `PressResult` of the lower forces), or None
     """
+
+    status = 3
 
     def __init__(self, message: str, *, result: Any = None) -> None:
         super().__init__(message)

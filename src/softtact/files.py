@@ -1,14 +1,11 @@
 """Read and write files. A file is written completely or not at all, with labels and provenance inside."""
 
 import contextlib
-import errno
 import hashlib
 import io
 import json
 import os
-import tempfile
-import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +13,17 @@ import numpy as np
 import yaml
 
 import softtact
-from softtact.errors import InputError, OutputError
+from softtact.checksums import SEALED, check, seal
+from softtact.errors import InputError
+from softtact.inputs import check_input, check_limit, in_one_sentence
+from softtact.outputs import NO_ROOM, not_written, target_of, temporary_file
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+_COUNTED = 10**12     # values of a YAML file; more are not told apart
+_AGAIN = "take a copy of it, or make it again"
 PROVENANCE = ("softtact_version", "config_digest", "seed")     # attributes of every data set that is written
 
 
@@ -29,58 +31,30 @@ PROVENANCE = ("softtact_version", "config_digest", "seed")     # attributes of e
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` if the block succeeds, delete it otherwise.
 
-    A full disk, or a folder that cannot be written to, becomes an `OutputError`.
+    A binary file gets its checksum. A link stays, and its target is written. A full disk, or a folder that cannot be written to,
+    becomes an `OutputError`.
     """
-    path = Path(path)
+    target, suffix = target_of(path), Path(path).suffix
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = temporary_file(target.parent, suffix)
     except OSError as error:
-        raise _not_written(path, error) from None
-    os.close(handle)
-    temporary = Path(name)
+        raise not_written(path, error) from None
     try:
         try:
             yield temporary
+            if suffix.lower() in SEALED:
+                seal(temporary)
         except OSError as error:
-            if error.errno in _NO_ROOM:
-                raise _not_written(path, error) from None
+            if error.errno in NO_ROOM:
+                raise not_written(path, error) from None
             raise
         umask = os.umask(0)
         os.umask(umask)
-        temporary.chmod(0o666 & ~umask)  # mkstemp makes private files; results are to be shared
-        os.replace(temporary, path)
+        temporary.chmod(0o666 & ~umask)  # a temporary file is private; results are to be shared
+        os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def refuse_overwriting(inputs: Iterable[Path | str | None], outputs: Mapping[str, Path | None]) -> None:
-    """Refuse an output {option: file or None} that is the same file as an input or another output, also through links."""
-    read = [Path(path) for path in inputs if path]
-    written: dict[str, Path] = {}
-    for option, path in ((option, path) for option, path in outputs.items() if path):
-        for other in read:
-            if _same_file(path, other):
-                raise InputError(f"{option} {path}: it is the input {other}, which would be lost; choose another name.")
-        for name, other in written.items():
-            if _same_file(path, other):
-                raise InputError(f"{option} {path}: {name} writes the same file; choose another name for one of them.")
-        written[option] = path
-
-
-def _same_file(one, other):
-    """Whether two paths lead to the same file, existing or not."""
-    if one.exists() and other.exists():
-        return one.samefile(other)
-    return one.resolve() == other.resolve()
-
-
-_NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
-
-
-def _not_written(path, error):
-    return OutputError(f"{path}: cannot be written ({error.strerror or error}); make room on the disk, or its folder writable, "
-                       "and run again.")
 
 
 class _OnceLoader(yaml.SafeLoader):
@@ -107,13 +81,31 @@ def read_yaml(path: str | Path, *, missing: str) -> Any:
 
     Raises InputError if there is no such file, if it is not valid YAML, or if a mapping has a key twice.
     """
+    check_input(path, "yaml", missing=missing)
     try:
         loader = _OnceLoader(Path(path).read_text(encoding="utf-8"))
-        return loader.get_single_data()
-    except FileNotFoundError:
-        raise InputError(f"{path}: {missing}") from None
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        check_limit(path, "values", _written_out(node, {}))
+        return loader.construct_document(node)
     except (UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:     # ValueError: 2001-99-99 is no date
         raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+
+
+def _written_out(node, known):
+    """Number of values below a YAML node if its aliases and merges are written out; `known` holds those of nodes.
+
+    Raises ValueError for a node that contains itself.
+    """
+    if id(node) not in known:
+        known[id(node)] = None
+        below = node.value if isinstance(node, yaml.CollectionNode) else ()
+        parts = [part for one in below for part in (one if isinstance(one, tuple) else (one,))]
+        known[id(node)] = min(1 + sum(_written_out(part, known) for part in parts), _COUNTED)
+    if known[id(node)] is None:
+        raise ValueError(f"line {node.start_mark.line + 1} contains itself")
+    return known[id(node)]
 
 
 def files_below(paths: str | Path | list[Path], *, suffix: str) -> list[Path]:
@@ -147,10 +139,9 @@ def parse_json(text: str) -> Any:
 
 def read_json(path: str | Path) -> Any:
     """Read a JSON file; an unreadable one raises `InputError` naming the file and the line."""
+    check_input(path, "json")
     try:
         return parse_json(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not valid JSON ({error}); write the file again.") from None
 
@@ -175,23 +166,29 @@ def write_dataset(path: str | Path, dataset: "xr.Dataset", *, seed: int | None, 
 
 def read_dataset(path: str | Path) -> "xr.Dataset":
     """Read a NetCDF file whole into memory."""
+    import h5py
     import xarray
 
-    try:
+    check_input(path, "arrays")
+    check(path)
+    with in_one_sentence(path, "not a readable NetCDF file", _AGAIN):
+        with h5py.File(path, "r") as file:
+            check_limit(path, "arrays", _unpacked(file))
         return xarray.load_dataset(path, engine="h5netcdf")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not a readable NetCDF file ({error}); delete it and make it again.") from None
+
+
+def _unpacked(file):
+    """Bytes of all arrays of an open HDF5 file as its headers state them; a compressed or empty one takes less on the disk."""
+    sizes: list[int] = []
+    file.visititems(lambda _, one: sizes.append(getattr(one, "nbytes", 0)))
+    return sum(sizes)
 
 
 @contextlib.contextmanager
 def read_arrays(path: str | Path) -> Iterator[np.lib.npyio.NpzFile]:
     """The arrays of an .npz file, open while a block reads them; a damaged file raises `InputError`."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            yield data
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not a readable file of arrays ({error}); delete it and make it again.") from None
+    check_input(path, "arrays")
+    check(path)
+    with in_one_sentence(path, "not a readable file of arrays", _AGAIN), np.load(path, allow_pickle=False) as data:
+        check_limit(path, "arrays", sum(one.file_size for one in data.zip.infolist()))
+        yield data

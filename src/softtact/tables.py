@@ -12,12 +12,14 @@ import codecs
 import csv
 import math
 import re
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
 from softtact.errors import InputError
+from softtact.inputs import check_input, check_limit, in_one_sentence
 
 SEPARATORS = "\t;,"
 DECIMALS = (".", ",")
@@ -120,10 +122,8 @@ def read_matrix(path: str | Path, *, what: str = "table") -> list[list[float]]:
 
 def read_text(path: str | Path, *, what: str = "table") -> str:
     """The text of a file in UTF-8, UTF-16 or cp1252. Raises InputError if the file is not text."""
-    try:
-        raw = Path(path).read_bytes()
-    except (FileNotFoundError, IsADirectoryError):
-        raise InputError(f"{path}: there is no such file; give the path of a {what}.") from None
+    check_input(path, "table", missing=f"there is no such file; give the path of a {what}.")
+    raw = Path(path).read_bytes()
     if raw.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         raise InputError(f"{path}: it is no text, but a workbook of Excel or another archive; save it as .xlsx, or as CSV.")
     try:
@@ -320,14 +320,13 @@ def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int,
     """
     import openpyxl  # of an extra: where it is missing, the command says which
 
-    if not Path(path).is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a workbook.")
-    try:
+    check_input(path, "workbook", missing="there is no such file; give the path of a workbook.")
+    with in_one_sentence(path, "not a readable workbook", "save it again as .xlsx, or as CSV"):
+        with zipfile.ZipFile(path) as parts:
+            check_limit(path, "workbook", sum(one.file_size for one in parts.infolist()))
         book = openpyxl.load_workbook(path, data_only=True)
         sheets = {page.title: page for page in book.worksheets}
-    except Exception as error:     # the readers of zip and XML raise errors of many kinds
-        reason = " ".join(str(error).split())[:120]
-        raise InputError(f"{path}: not a readable workbook ({reason}); save it again as .xlsx, or as CSV.") from None
+        check_limit(path, "cells", max((page.max_row * page.max_column for page in sheets.values()), default=0))
     page = sheets[_chosen(path, sheets, sheet)]
     return [(row, [_cell(path, cell) for cell in cells]) for row, cells in enumerate(page.iter_rows(), 1)]
 

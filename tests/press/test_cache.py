@@ -1,8 +1,14 @@
 """What the fast models start from is computed anew where it would be another, and only there."""
 
+import errno
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 import pytest
 from support.sensors import CORO
 
+from softtact.files import read_arrays
 from softtact.press import cache
 
 
@@ -68,3 +74,82 @@ def test_a_preparation_takes_no_time_once_it_is_there(computed):
     assert cache.in_words(cache.seconds_to_prepare_foundation(large, LAWS)) == "about 5 minutes"
     cache.cached_foundation(CORO, LAWS)
     assert cache.seconds_to_prepare_foundation(CORO, LAWS) == 0.0
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """Prepared data of a few numbers."""
+
+    values: np.ndarray
+
+    def save(self, path):
+        np.savez(path, values=self.values)
+
+    @classmethod
+    def load(cls, path):
+        with read_arrays(path) as data:
+            return cls(data["values"])
+
+
+@pytest.fixture
+def prepare(tmp_path, monkeypatch):
+    """A function that takes the elastic layer from the cache, which is in a folder below tmp_path; it returns its numbers."""
+    times = []
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(cache, "elastic_compliance", lambda *_, **__: times.append(1) or _Numbers(np.arange(100.0)))
+    monkeypatch.setattr(cache, "Compliance", _Numbers)
+    cache._warn.cache_clear()
+
+    def prepare():
+        np.testing.assert_array_equal(cache.cached_compliance(CORO).values, np.arange(100.0))
+        return len(times)
+
+    return prepare
+
+
+def damaged(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def cut_off(path):
+    path.write_bytes(path.read_bytes()[:200])
+
+
+def of_other_data(path):
+    np.savez(path, others=np.zeros(3))
+
+
+@pytest.mark.parametrize("spoil", [damaged, cut_off, of_other_data])
+def test_a_spoilt_file_of_the_cache_is_told_and_made_again(spoil, prepare, tmp_path, capsys):
+    assert (prepare(), prepare()) == (1, 1)
+    (file,) = (tmp_path / "cache/softtact").iterdir()
+    spoil(file)
+    assert (prepare(), prepare()) == (2, 2)
+    told = capsys.readouterr().err
+    assert told.count("WARNING") == 1 and f"WARNING: {file}: " in told and "It is computed again." in told
+
+
+def a_file_in_its_place(folder, monkeypatch):
+    folder.write_text("where the cache's folder should be")
+
+
+def a_full_disk(folder, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+
+
+def no_home(folder, monkeypatch):
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("Could not determine home directory.")))
+
+
+@pytest.mark.parametrize("fault", [a_file_in_its_place, a_full_disk, no_home])
+def test_a_cache_that_cannot_be_written_stops_no_press_and_is_told_once(fault, prepare, tmp_path, monkeypatch, capsys):
+    fault(tmp_path / "cache", monkeypatch)
+    assert (prepare(), prepare()) == (1, 2)
+    told = capsys.readouterr().err
+    assert told.count("WARNING") == 1 and "set XDG_CACHE_HOME to a folder with room" in told

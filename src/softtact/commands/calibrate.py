@@ -78,7 +78,7 @@ def _calibrate(options):
 
 def _checked(options):
     """(recording, mesh, force, place) of each recording as stated. Raises InputError for outputs that would overwrite an input."""
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
 
     check_folders(options.out, options.report)
     check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})

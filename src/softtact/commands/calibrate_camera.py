@@ -39,7 +39,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _calibrate(options):
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
     from softtact.sensors.base import read_mapping
 
     files = _outputs(options.out)

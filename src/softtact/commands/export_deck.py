@@ -49,7 +49,7 @@ def _export_solid(options):
     """The deck of a press on a sensor of kind solid."""
     from softtact.contact.motion import Motion
     from softtact.decks.solid import export_solid
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
     from softtact.press.solid import body_of
 
     spec, forces, pose = any_sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
@@ -73,8 +73,8 @@ def _export_solid(options):
 
 def _export_layered(options):
     """The deck of the hyperelastic press on layers."""
-    from softtact.files import refuse_overwriting
     from softtact.geometry.meshes import check_over_sensor, place
+    from softtact.outputs import refuse_overwriting
 
     spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     spec.need_frusta("export-deck", "name a sensor of kind frusta")

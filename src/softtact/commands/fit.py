@@ -51,10 +51,11 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _fit(options):
-    from softtact.files import refuse_overwriting, write_json
+    from softtact.files import write_json
     from softtact.materials.card_making import make_card, misfit_warnings
     from softtact.materials.making import curves_of
     from softtact.materials.readers import read_curves
+    from softtact.outputs import refuse_overwriting
 
     check_folders(options.out, options.plot)
     config = _material(options)

@@ -82,7 +82,7 @@ def _complexity(options):
 
 def _mesh(options):
     from softtact.fem.mesh_files import write_mesh
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
 
     check_folders(options.out)
     check_names({options.out: (".vtu",)})

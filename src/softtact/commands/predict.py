@@ -34,7 +34,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _predict(options):
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
 
     check_folders(options.out, options.plot)
     refuse_overwriting([options.maps, options.network], {"--out": options.out, "--plot": options.plot})

@@ -97,7 +97,7 @@ def _add_soft(command):
 
 
 def _press(options):
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
 
     spec, pose = any_sensor_spec(options.sensor), pose_of(options)
     _refuse_idle(options, spec)

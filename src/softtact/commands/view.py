@@ -34,7 +34,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _view(options):
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
     from softtact.reporting.press_view import read_view, save_picture, write_page
 
     check_folders(options.save, options.page)

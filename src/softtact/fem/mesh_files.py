@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softtact.checksums import check
 from softtact.errors import InputError
 from softtact.fem.quadratic_nodes import QUADRATIC, raised
 from softtact.fem.solid_mesh import ELEMENTS, FACETS, SolidMesh
 from softtact.files import atomic_path
 from softtact.geometry.meshes import UNIT_MM
+from softtact.inputs import check_input
 
 if TYPE_CHECKING:
     import meshio
@@ -116,8 +118,8 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
 def _read(path: Path) -> "meshio.Mesh":
     import meshio
 
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such mesh file.")
+    check_input(path, "mesh", missing="there is no such mesh file.")
+    check(path, foreign=True)
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):     # meshio prints errors itself
             return meshio.read(path)

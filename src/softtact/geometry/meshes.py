@@ -16,6 +16,7 @@ from softtact.geometry.obj import read_obj
 from softtact.geometry.ply import read_ply
 from softtact.geometry.pose import Pose
 from softtact.geometry.stl import read_stl
+from softtact.inputs import check_input, check_limit
 
 UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, "in": 25.4}
 _READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply}
@@ -157,13 +158,13 @@ def facets_over(triangles: np.ndarray, footprint_mm: tuple[float, float]) -> np.
 
 def _load_facets(path: Path) -> np.ndarray:
     """Facets (n, 3, 3) in the file's unit."""
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such mesh file.")
+    check_input(path, "mesh", missing="there is no such mesh file.")
     if path.suffix.lower() not in _READERS:
         raise InputError(f"{path}: the format '{path.suffix}' is not read; save the mesh as STL, OBJ or PLY.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; export the mesh again.")
     triangles = _READERS[path.suffix.lower()](path)
+    check_limit(path, "facets", len(triangles))
     if triangles.size == 0:
         raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
     return triangles

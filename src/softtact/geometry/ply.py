@@ -17,6 +17,7 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.geometry.mesh_text import line_at, plain_text, shown
 from softtact.geometry.polygons import Polygons, facets_of
+from softtact.inputs import check_limit
 
 _CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
           "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f", "float64": "d"}
@@ -78,6 +79,7 @@ def read_ply(path: Path) -> np.ndarray:
     lines = plain_text(path, data[first.end():last.start()]).split(b"\n")
     header = _read_header(path, lines)
     indices = _indices_of(path, header)
+    check_limit(path, "facets", sum(element.count for element in header.elements if element.name == "face"))
     body: _Text | _Binary = _Binary(path, data, last.end(), header.order) if header.order else _Text(
         path, plain_text(path, data[last.end():]), len(lines) + 3)
     wanted = {"vertex": ("x", "y", "z"), "face": (indices,)}

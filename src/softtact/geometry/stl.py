@@ -11,6 +11,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.geometry.mesh_text import is_finite, is_text, line_at, no_number, plain_text, shown
+from softtact.inputs import check_limit
 
 _HEADER = 84     # bytes: 80 of any text, 4 of the number of facets
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -37,6 +38,7 @@ def _read_binary(path, data, declared):
         fault = "was cut off" if len(data) < end else "holds more than it declares"
         raise InputError(f"{path}: as a binary STL it declares {declared} facets, which take {end} bytes, but has {len(data)}, "
                          f"so it {fault}; {_AGAIN}")
+    check_limit(path, "facets", declared)
     return np.frombuffer(data, _FACET, count=declared, offset=_HEADER)["corners"].astype(float)
 
 

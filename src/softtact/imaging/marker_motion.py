@@ -14,6 +14,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.optimize import least_squares
 
 from softtact.errors import InputError
+from softtact.inputs import check_input, in_one_sentence
 
 COLUMNS = ("Mx", "My", "dx", "dy")
 _SOFT_PX = 0.3      # residuals above count linearly: half of the rounding to whole px
@@ -33,12 +34,9 @@ class MarkerMotion:
     @classmethod
     def read(cls, path: str | Path) -> "MarkerMotion":
         """From a CSV with the columns Mx, My (px at rest), dx, dy (motion in px). Raises InputError for another file."""
-        try:
+        check_input(path, "table", missing="there is no such file of markers; correct the path.")
+        with in_one_sentence(path, "not readable as CSV", f"write it with the columns {', '.join(COLUMNS)}"):
             table = pd.read_csv(path)
-        except FileNotFoundError:
-            raise InputError(f"{path}: there is no such file of markers; correct the path.") from None
-        except (ValueError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: not readable as CSV ({error}); write it with the columns {', '.join(COLUMNS)}.") from None
         if missing := [name for name in COLUMNS if name not in table]:
             raise InputError(f"{path}, column {missing[0]!r}: it is missing; write the columns {', '.join(COLUMNS)}.")
         values = table[list(COLUMNS)].apply(pd.to_numeric, errors="coerce").to_numpy(float)

@@ -16,6 +16,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from softtact.errors import InputError
+from softtact.inputs import check_input, check_limit, in_one_sentence
 
 LEAST_CONTRAST = 0.2      # the faintest of 99 markers on a real gel has 0.37 (docs/how-to/camera_of_a_gel.md)
 _RADII = np.geomspace(2.0, 20.0, 24)      # px, among which the markers' radius is searched
@@ -121,15 +122,12 @@ def track(rest: np.ndarray, now: np.ndarray, *, limit_px: float) -> np.ndarray:
 
 def read_image(path: str | Path) -> np.ndarray:
     """An image (rows, columns, 3) uint8 of a file. Raises InputError that names the file where it is none."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
-    try:
-        with Image.open(path) as image:
-            return np.asarray(image.convert("RGB"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such image.") from None
-    except (UnidentifiedImageError, OSError, ValueError) as error:
-        raise InputError(f"{path}: not a readable image ({error}); give a PNG, JPEG, BMP or TIFF file.") from None
+    check_input(path, "picture", missing="there is no such image.")
+    with in_one_sentence(path, "not a readable image", "give a PNG, JPEG, BMP or TIFF file"), Image.open(path) as image:
+        check_limit(path, "pixels", image.width * image.height)
+        return np.asarray(image.convert("RGB"))
 
 
 def _apart(px, height, least):

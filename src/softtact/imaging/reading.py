@@ -21,13 +21,13 @@ import tifffile
 from PIL import ExifTags, Image, ImageOps
 
 from softtact.errors import FrameWarning, InputError, how_to_install
+from softtact.inputs import VARIABLE, check_input, limit
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp")
 STACKS = (".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv")
 ANIMATIONS = (".gif",)
 LOSSY = (".jpg", ".jpeg", *VIDEOS)
-MOST_PIXELS = 100_000_000   # of a frame; detection takes about 170 bytes for each
 SRGB_HINT = ("the file says that its values are encoded for a screen (sRGB), and they are taken as proportional to light; "
              "give --transfer srgb, or --transfer linear if they are.")
 _FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF")
@@ -81,8 +81,7 @@ def read_frame(file: str | Path) -> np.ndarray:
 
 def _numbered(file, *, every):
     """Pairs (name, frame) of one file; a single image has the name of the file."""
-    if not file.is_file():
-        raise InputError(f"{file}: there is no such file.")
+    check_input(file, "picture" if file.suffix.lower() in IMAGES else "movie")
     with _in_one_sentence(file):
         number = -1
         for number, (label, read) in enumerate(_reader(file)(file)):
@@ -144,9 +143,9 @@ def still_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarr
 
 def check_size(width: int, height: int) -> None:
     """Refuse a frame that is too large for the memory, or whose size is invalid."""
-    if width * height > MOST_PIXELS:
-        raise InputError(f"a frame of {width} x {height} pixels is larger than {MOST_PIXELS / 1e6:.0f} million pixels; "
-                         "crop it, or average pixels.")
+    if width * height > (most := limit("pixels")):
+        raise InputError(f"a frame of {width} x {height} pixels is larger than {most / 1e6:.0f} million pixels; crop it, average "
+                         f"pixels, or raise all limits: set {VARIABLE}=2 or more.")
 
 
 def _is_deep(file, image):

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from softtact.checksums import check
 from softtact.errors import InputError
 from softtact.files import digest
+from softtact.inputs import check_input, in_one_sentence
 
 _IN_MEMORY_BYTES = 2e9      # above that, frames are read from their files when they are needed
 _VARIABLES = ("depth_grey", "image")
@@ -68,14 +70,15 @@ def open_sequences(paths: Sequence[str | Path], *, split: str, longest_only: boo
     import h5py
 
     grey, image, first, length, offset = [], [], [], [], 0
+    for path in paths:
+        check_input(path, "arrays")
     whole = sum(Path(path).stat().st_size for path in paths) < _IN_MEMORY_BYTES
     for path in paths:
-        try:
+        check(path)
+        with in_one_sentence(path, "not a file of image sequences", "press the objects again"):
             file = h5py.File(path, "r")
             parts = [file[name] for name in _VARIABLES]
             numbers, splits = file["sequence"][:], file["split"].asstr()[:]
-        except (OSError, KeyError) as error:
-            raise InputError(f"{path}: not a file of image sequences ({error}); press the objects again.") from None
         grey.append(parts[0][:] if whole else parts[0])
         image.append(parts[1][:] if whole else parts[1])
         for number in np.unique(numbers[splits == split]):

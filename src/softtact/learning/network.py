@@ -14,6 +14,7 @@ Inside a network, maps and counts are divided by two constants of the training s
 are stored with the weights; input and output are in mm and counts.
 """
 
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,8 +24,10 @@ import torch
 from torch import nn
 
 import softtact
+from softtact.checksums import check
 from softtact.errors import InputError
 from softtact.files import atomic_path
+from softtact.inputs import check_input, check_limit
 
 
 class TactileNetwork(nn.Module):
@@ -158,12 +161,17 @@ def save(path: str | Path, stored: dict[str, Any]) -> None:
 
 def load(path: str | Path) -> dict[str, Any]:
     """Read a file of `save`. Raises InputError for a file with anything but tensors and plain values."""
+    check_input(path, "arrays", missing="there is no such file; train the network first.")
+    check(path)
     try:
+        with zipfile.ZipFile(path) as parts:
+            check_limit(path, "arrays", sum(one.file_size for one in parts.infolist()))
         return torch.load(path, map_location="cpu", weights_only=True)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; train the network first.") from None
-    except Exception as error:  # torch passes on any error of its unpickler
-        raise InputError(f"{path}: not a network's file ({_reason(error)}); delete it and train again.") from None
+    except InputError:
+        raise
+    except Exception:  # torch passes on any error of its unpickler, with advice to load the file although it may run code
+        raise InputError(f"{path}: not a network's file: it is damaged, or holds more than tensors and plain values; take a copy "
+                         "of it, or train again.") from None
 
 
 def _reason(error):

@@ -11,6 +11,7 @@ import xarray
 
 from softtact.errors import InputError
 from softtact.files import read_dataset, write_csv, write_dataset
+from softtact.inputs import check_input, in_one_sentence
 from softtact.tables import read_matrix
 
 MARGIN = 1e-3     # relative excess over the training's range without a remark, for rounded files
@@ -37,8 +38,7 @@ def read_maps(path: str | Path, *, shape: Sequence[int]) -> Maps:
     readers = {".nc": _read_press, ".npy": _read_npy, ".csv": _read_csv}
     if Path(path).suffix not in readers:
         raise InputError(f"{path}: maps are read from {', '.join(readers)}; give one of these.")
-    if not Path(path).is_file():
-        raise InputError(f"{path}: there is no such file.")
+    check_input(path, "arrays")
     maps = readers[Path(path).suffix](path)
     got = maps.maps_mm.shape[1:]
     if got != tuple(shape):
@@ -66,11 +66,8 @@ def _read_press(path):
 
 
 def _read_npy(path):
-    try:
+    with in_one_sentence(path, "not an array of numbers", "write it with numpy.save"):
         values = np.load(path, allow_pickle=False)
-    except Exception as error:     # the header is read with Python's parser, which raises errors of many kinds
-        reason = " ".join(str(error).split())[:120]
-        raise InputError(f"{path}: not an array of numbers ({reason}); write it with numpy.save.") from None
     return _one_map(path, values)
 
 

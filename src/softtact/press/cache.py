@@ -1,10 +1,13 @@
 """Prepared data of a sensor's fast models, computed once for a sensor and kept in the user's cache."""
 
+import contextlib
 import math
 import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
+from softtact.errors import InputError, OutputError, SofttactError
 from softtact.files import atomic_path, digest
 from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import Compliance, elastic_compliance
@@ -66,7 +69,8 @@ def cached_frustum_law(spec: SensorSpec, law: Law) -> FrustumLaw:
 
 def seconds_to_prepare_foundation(spec: SensorSpec, laws: Mapping[str, Law]) -> float:
     """Estimated time of `cached_foundation` on two cores; 0 if it is cached."""
-    return 0.0 if _file("foundation", _of_foundation(spec, laws)).exists() else _seconds(spec, *_FOUNDATION_TAKES)
+    path = _file("foundation", _of_foundation(spec, laws))
+    return 0.0 if path is not None and path.exists() else _seconds(spec, *_FOUNDATION_TAKES)
 
 
 def _of_foundation(spec, laws):
@@ -90,14 +94,36 @@ def _seconds(spec, seconds, power):
 
 
 def _file(kind, values):
-    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
-    return cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
+    """The file of prepared data, or None where there is no home folder for it."""
+    with contextlib.suppress(RuntimeError):     # of Path.home
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "softtact"
+        return cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
+    return None
 
 
 def _cached(kind, values, cls, message, compute):
+    """The prepared data of a file; computed, with a word, where the file is missing or damaged, and kept where that is possible."""
     path = _file(kind, values)
-    if not path.exists():
-        announce(message)
+    if path is not None and path.exists():
+        try:
+            return cls.load(path)
+        except InputError as error:
+            _warn(f"{error} It is computed again.")
+    announce(message)
+    prepared = compute()
+    try:
+        if path is None:
+            raise OutputError("there is no home folder for prepared data.")
         with atomic_path(path) as temporary:
-            compute().save(temporary)
-    return cls.load(path)
+            prepared.save(temporary)
+        return cls.load(path)
+    except (SofttactError, OSError) as error:
+        _warn(f"{error} What was computed is not kept, so that the next run computes it again; set XDG_CACHE_HOME to a folder with "
+              "room in which files can be written.")
+    return prepared
+
+
+@cache
+def _warn(sentence):
+    """Say a sentence on stderr, once."""
+    announce(f"WARNING: {sentence}")

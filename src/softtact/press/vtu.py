@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softtact.checksums import check
 from softtact.errors import InputError
 from softtact.fem.mesh_files import write_mesh
 from softtact.files import atomic_path
+from softtact.inputs import check_input, in_one_sentence
 from softtact.models.solid.result import SolidFields
 from softtact.press.objects import PlacedObject
 
@@ -119,13 +121,10 @@ def read_vtu(path: str | Path) -> PressedMesh:
     """The `PressedMesh` of a file that `PressedMesh.write` wrote; its pressures are left out."""
     from meshio import vtu
 
-    try:
+    check_input(path, "mesh")
+    check(path)
+    with in_one_sentence(path, "not readable as VTU", "write it again"):
         mesh = vtu.read(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except Exception as error:     # the reader fails in many ways
-        raise InputError(f"{path}: not readable as VTU ({' '.join(str(error).split())[:120] or type(error).__name__}); "
-                         "write it again.") from None
     load_steps = sorted((int(match[2] or 0), float(match[1]), name)
                         for name in mesh.point_data if (match := _LOAD_STEP.fullmatch(name)))
     if not load_steps:

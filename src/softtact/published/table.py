@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.errors import InputError
+from softtact.inputs import check_input
 from softtact.tables import encoding_of
 
 PIECE = 57 * 200    # rows read at a time: about 4 MB
@@ -120,6 +121,7 @@ def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> 
     codes: dict[str, int] = {}
     texts: dict[int, str] = {}
     pieces = []
+    check_input(path, "archive")
     try:
         layout = read_layout(path, columns=columns, force=force, outliers=outliers)
         with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):     # about more than one surplus field

@@ -14,10 +14,11 @@ import numpy as np
 import pandas as pd
 
 from softtact.errors import FrameWarning, InputError
-from softtact.files import refuse_overwriting, write_csv
+from softtact.files import write_csv
 from softtact.imaging.discs import discs_and_outlines
 from softtact.imaging.light import grey
 from softtact.imaging.reading import image_files, is_lossy, read_frames
+from softtact.outputs import refuse_overwriting
 from softtact.progress import progress
 from softtact.reporting.style import pyplot, save
 

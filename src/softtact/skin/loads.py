@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.inputs import check_input, check_limit, in_one_sentence
 from softtact.skin.layout import Layout
 
 RATIO = 1.5  # of a fingertip's axes, the longer one along y: the authors' published toolbox
@@ -62,15 +63,12 @@ def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, p
     The mean of the dark pixels lies at centre_mm; rows of the picture run downwards, y upwards.
     Raises InputError where the file is no picture, or has no dark pixel.
     """
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
-    try:
-        with Image.open(path) as picture:
-            grey = np.asarray(picture.convert("L"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such picture; correct the load's `mask`.") from None
-    except (UnidentifiedImageError, OSError) as error:
-        raise InputError(f"{path}: not a readable picture ({error}); save the mask as PNG.") from None
+    check_input(path, "picture", missing="there is no such picture; correct the load's `mask`.")
+    with in_one_sentence(path, "not a readable picture", "save the mask as PNG"), Image.open(path) as picture:
+        check_limit(path, "pixels", picture.width * picture.height)
+        grey = np.asarray(picture.convert("L"))
     row, column = np.nonzero(grey < 128)
     if not len(row):
         raise InputError(f"{path}: no pixel is dark, so that nothing presses; draw the contact area in black on white.")

@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 def run_stage(options: argparse.Namespace) -> None:
     """Import the stage and call it."""
-    from softtact.files import refuse_overwriting
+    from softtact.outputs import refuse_overwriting
     from softtact.studies.jobs import find_stage
 
     run = find_stage(options.stage if "." in options.stage else f"hybrid.{options.stage}")

@@ -18,7 +18,8 @@ from typing import Any
 
 import softtact
 from softtact.errors import InputError
-from softtact.files import read_json, refuse_overwriting, write_json
+from softtact.files import read_json, write_json
+from softtact.outputs import refuse_overwriting
 from softtact.progress import announce
 from softtact.studies.code_closure import code_digest
 
