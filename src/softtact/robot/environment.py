@@ -21,6 +21,7 @@ from softtact.geometry.meshes import read_mesh
 from softtact.press.sensor import load_sensor
 from softtact.robot.arm import HOME_RAD, JOINTS, inverse_kinematics
 from softtact.robot.events import FINGERS
+from softtact.robot.gels import GelReadings, has_gel
 from softtact.robot.grasp import contacts, object_poses, pad_forces
 from softtact.robot.scene import DOWN, MM, Placement, Scene, build_scene, start
 from softtact.robot.settings import load_scene
@@ -42,8 +43,9 @@ class GraspEnv(gymnasium.Env):
     Action (3,) in -1 to 1: grip (force of each pad from 0, open, to `largest_force_n`), lift (speed of the hand, up to 50 mm/s) and
     slide (along the sensors' short side, up to 20 mm/s). The fixture lets go when the hand begins to rise; until then the hand can
     slide over the object.
-    Observation: `tactile` (2, row, column) counts of the ideal readout, `force_n` (2, 3) on each sensor in its frame, `object_pose`
-    (7,) in the left sensor's frame, mm and quaternion w, x, y, z.
+    Observation: `force_n` (2, 3) on each sensor in its frame, `object_pose` (7,) in the left sensor's frame, mm and quaternion w,
+    x, y, z. Of a sensor with taxels `tactile` (2, row, column), counts of the ideal readout; of a gel with a camera each of its
+    readouts by name, (2, ...), such as `camera`, `markers`, `depth`.
     Reward: height gained by the object, as a share of 40 mm. An episode ends when the object is lifted by 40 mm, or dropped.
     """
 
@@ -55,7 +57,7 @@ class GraspEnv(gymnasium.Env):
         """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder with its flat ends on the pads
 
         model: elastic or foundation;  scene: keys of a scene file, such as {"friction": 0.4}
-        place_step_mm: grid of the places that are pressed (`TaxelMemory`)
+        place_step_mm: grid of the places that are pressed (`TaxelMemory`); of taxels alone
         Raises InputError for a model that is too slow, and as `build_scene` does.
         """
         if model not in ("elastic", "foundation"):
@@ -63,11 +65,14 @@ class GraspEnv(gymnasium.Env):
         self._sensor, self._settings, self._mass_kg = load_sensor(sensor), load_scene(**(scene or {})), mass_kg
         self._mesh = _mesh_of(mesh, unit)
         self.largest_force_n = float(largest_force_n)
-        self._memory = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n, place_step_mm)
-        taxels = self._sensor.spec.need_taxels("the environment")
+        self._readings: TaxelMemory | GelReadings
+        if has_gel(self._sensor):
+            self._readings = GelReadings(self._sensor, self._mesh, self._settings.friction, model, self.largest_force_n)
+        else:
+            self._readings = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n, place_step_mm)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({
-            "tactile": gymnasium.spaces.Box(0, 65535, (2, taxels.rows, taxels.columns), np.uint16),
+            **{name: _space_of(values) for name, values in self._readings.at_rest.items()},
             "force_n": gymnasium.spaces.Box(-np.inf, np.inf, (2, 3), np.float32),
             "object_pose": gymnasium.spaces.Box(-np.inf, np.inf, (7,), np.float32)})
         self._joints: np.ndarray | None = None
@@ -84,6 +89,7 @@ class GraspEnv(gymnasium.Env):
         placement = replace(Placement(**drawn), **(options or {}))
         self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, placement, mass_kg=self._mass_kg)
         self._place_hand()
+        self._readings.begin()
         return self._observe(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -146,13 +152,17 @@ class GraspEnv(gymnasium.Env):
 
     def _observe(self):
         forces, poses = pad_forces(self._scene.model, self._data), object_poses(self._data)
-        counts = [self._memory.counts(finger, poses[finger], -forces[finger, 2]) for finger in (0, 1)]
-        return {"tactile": np.round(counts).astype(np.uint16), "force_n": forces.astype(np.float32),
+        return {**self._readings.observe(poses, forces), "force_n": forces.astype(np.float32),
                 "object_pose": poses[0].astype(np.float32)}
 
     def _info(self):
-        return {"risen_mm": self._risen_mm(), "opening_mm": self._scene.opening_mm(self._data),
-                "places_pressed": self._memory.places}
+        return {"risen_mm": self._risen_mm(), "opening_mm": self._scene.opening_mm(self._data), **self._readings.facts()}
+
+
+def _space_of(values):
+    """The space of a reading that is (2, ...) at rest."""
+    low, high = (0, np.iinfo(values.dtype).max) if values.dtype.kind == "u" else (-np.inf, np.inf)
+    return gymnasium.spaces.Box(low, high, values.shape, values.dtype.type)
 
 
 def _mesh_of(mesh, unit):

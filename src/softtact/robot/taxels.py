@@ -27,7 +27,7 @@ from softtact.press.fast import thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.sensor import Sensor
 from softtact.readout.taxels import counts_of
-from softtact.robot.events import set_down
+from softtact.robot.events import FINGERS, set_down
 
 # The mesh in each finger's frame: the right finger is behind it, and rotations about z change their sign.
 _FACING = (Rotation.identity(), Rotation.from_euler("y", 180, degrees=True))
@@ -57,6 +57,7 @@ class TaxelMemory:
     _surfaces: dict = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.sensor.spec.need_taxels("the environment")
         side = min(self.sensor.spec.footprint_mm)
         if not 0 < self.step_mm < side:
             raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
@@ -66,6 +67,24 @@ class TaxelMemory:
         spec = self.sensor.spec
         self._first_mm = np.array([spec.map_y_mm[0], spec.map_x_mm[0]])     # as maps are indexed: y, x
         self._pitch_mm = np.array([np.ptp(line) / (len(line) - 1) for line in (spec.map_y_mm, spec.map_x_mm)])
+
+    @property
+    def at_rest(self) -> dict[str, np.ndarray]:
+        """{tactile: (finger, row, column)} of free sensors."""
+        taxels = self.sensor.spec.need_taxels("the environment")
+        return {"tactile": np.zeros((len(FINGERS), taxels.rows, taxels.columns), dtype=np.uint16)}
+
+    def begin(self) -> None:
+        """An episode begins: what was pressed is kept."""
+
+    def observe(self, poses: np.ndarray, forces: np.ndarray) -> dict[str, np.ndarray]:
+        """{tactile: (finger, row, column)} of both sensors under an object at poses (finger, 7) with forces (finger, 3) in N."""
+        counts = [self.counts(finger, poses[finger], -forces[finger, 2]) for finger in range(len(FINGERS))]
+        return {"tactile": np.round(counts).astype(np.uint16)}
+
+    def facts(self) -> dict[str, Any]:
+        """What an environment tells beside the readings."""
+        return {"places_pressed": self.places}
 
     @property
     def places(self) -> int:

@@ -1,0 +1,84 @@
+"""Gels in the environment for learning: they carry the scene's forces, and their markers move as the object drags them."""
+
+import numpy as np
+import pytest
+
+from softtact.errors import InputError
+
+gymnasium = pytest.importorskip("gymnasium", reason="pip install 'softtact[robot]'")
+pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+
+ID = "softtact.robot.environment:softtact/Grasp-v0"
+STILL = {"x_mm": 0.0, "y_mm": 0.0, "angle_deg": 0.0}
+COARSE = """
+kind: layers
+name: small_gel
+footprint_mm: [16, 20]
+map_shape: [41, 33]
+force_range_n: [0, 50]
+support: base
+layers: [{material: gel_silicone, thickness_mm: 3.0}]
+elastic_layer: {young_mpa: 0.4, poisson: 0.48}
+edge: far
+friction: {object: 0.5}
+readouts:
+  camera: {kind: camera, pixels: [64, 48], mm_per_px: 0.3, distance_mm: 30, shading: gelsight_mini,
+           markers: {rows: 3, columns: 5, pitch_mm: 2.5, radius_mm: 0.5}}
+  markers: {kind: markers}
+"""
+
+
+@pytest.fixture(scope="module")
+def gel(tmp_path_factory):
+    path = tmp_path_factory.mktemp("gel") / "small_gel.yaml"
+    path.write_text(COARSE)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def grasp(gel):
+    """(environment, observation at rest, in the grip, after a slide) of one episode."""
+    env = gymnasium.make(ID, sensor=gel, mass_kg=0.1)
+    rest, _ = env.reset(seed=1, options=STILL)
+    held = [env.step(np.array([-0.6, 0.0, 0.0]))[0] for _ in range(30)][-1]
+    slid = [env.step(np.array([-0.6, 0.0, 1.0]))[0] for _ in range(12)][-1]
+    return env, rest, held, slid
+
+
+def test_observations_are_the_readouts_of_both_gels(grasp):
+    env, rest, held, _ = grasp
+    assert rest["camera"].shape == (2, 48, 64, 3) and rest["camera"].dtype == np.uint8 and rest["markers"].shape == (2, 15, 2)
+    assert env.observation_space.contains(rest) and env.observation_space.contains(held)
+    assert np.abs(held["camera"].astype(int) - rest["camera"]).max() > 20
+
+
+def test_a_gel_carries_the_force_and_the_shear_of_the_scene(grasp):
+    env, _, _, slid = grasp
+    for finger, touch in env.unwrapped._readings._touches.items():
+        force = touch.mover._state
+        carried = np.append(force.tangential.sum(axis=(1, 2)), -force.normal.sum())
+        wanted, bound = slid["force_n"][finger], 0.8 * -slid["force_n"][finger, 2]     # 0.8: the scene's friction
+        assert np.linalg.norm(wanted[:2]) > 0.5 * bound                                 # the slide drags
+        assert carried[2] == pytest.approx(wanted[2], rel=1e-4)
+        assert np.linalg.norm(carried[:2] - wanted[:2]) < 0.05 * bound     # followed to 0.98 of the bound, within 0.02 of it
+
+
+def test_markers_move_with_the_object_that_drags_them(grasp):
+    _, rest, held, slid = grasp
+    along, moved = slid["force_n"][0, :2], (slid["markers"] - held["markers"])[0]
+    under = np.abs(held["markers"] - rest["markers"])[0].sum(axis=1).argsort()[-5:]
+    assert np.linalg.norm(moved[under].mean(axis=0)) > 0.3                        # px of 0.3 mm
+    direction = moved[under].mean(axis=0) / np.linalg.norm(moved[under].mean(axis=0))
+    assert abs(direction @ (along / np.linalg.norm(along))) > 0.95
+
+
+def test_a_gel_that_is_free_again_is_at_rest(grasp):
+    env, rest, *_ = grasp
+    for _ in range(15):
+        opened = env.step(np.array([-1.0, 0.0, 0.0]))[0]
+    assert np.array_equal(opened["camera"], rest["camera"]) and np.array_equal(opened["markers"], rest["markers"])
+
+
+def test_another_model_than_the_one_that_follows_is_refused(gel):
+    with pytest.raises(InputError, match="model='foundation': a gel with a camera has the elastic model alone"):
+        gymnasium.make(ID, sensor=gel, model="foundation")
