@@ -29,17 +29,17 @@ class Limit:
 
 
 LIMITS = {
-    "yaml": Limit(2e6, "bytes", "a YAML file"),
+    "yaml": Limit(0.5e6, "bytes", "a YAML file"),
     "values": Limit(200_000, "values", "a YAML file with its aliases and merges written out"),
-    "json": Limit(50e6, "bytes", "a JSON file"),
+    "json": Limit(20e6, "bytes", "a JSON file"),
     "table": Limit(100e6, "bytes", "a table or recording of text"),
     "archive": Limit(4e9, "bytes", "a table of the published archive"),
-    "workbook": Limit(50e6, "bytes", "a workbook once unpacked"),
+    "workbook": Limit(50e6, "bytes", "a workbook, unpacked"),
     "cells": Limit(2e6, "cells", "a sheet, with its empty ones"),
-    "mesh": Limit(500e6, "bytes", "a mesh file"),
+    "mesh": Limit(300e6, "bytes", "a mesh file, unpacked"),
     "facets": Limit(4e6, "facets", "a mesh"),
-    "arrays": Limit(16e9, "bytes", "a file of arrays once unpacked"),
-    "picture": Limit(1e9, "bytes", "a picture"),
+    "arrays": Limit(16e9, "bytes", "a file of arrays, unpacked"),
+    "picture": Limit(1e9, "bytes", "a picture file"),
     "pixels": Limit(100e6, "pixels", "a picture"),
     "movie": Limit(20e9, "bytes", "a movie or a stack of pictures"),
 }

@@ -7,9 +7,11 @@ are elements, those of one dimension less name faces. Linear elements are conver
 Faces can also be defined by rules such as `z<0.1` or `x>-3 & x<3 & z>2` for the centres of the outer facets in mm.
 """
 
+import base64
 import contextlib
 import io
 import re
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +24,7 @@ from softtact.fem.quadratic_nodes import QUADRATIC, raised
 from softtact.fem.solid_mesh import ELEMENTS, FACETS, SolidMesh
 from softtact.files import atomic_path
 from softtact.geometry.meshes import UNIT_MM
-from softtact.inputs import check_input
+from softtact.inputs import check_input, check_limit
 
 if TYPE_CHECKING:
     import meshio
@@ -30,6 +32,9 @@ if TYPE_CHECKING:
 _REGION, _FACE, _GEOMETRY = "region:", "face:", "geometry:"
 _FACET_CORNERS = {"line": 2, "triangle": 3, "quad": 4} | {kind: element.corners for kind, element in FACETS.items()}
 _DIMENSION = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3}
+_PACKED = re.compile(rb"<VTKFile[^>]* compressor=[^>]*>")
+_INLINE = re.compile(rb'<DataArray[^>]* format="binary"[^>]*>\s*([\w+/]{16,32})')
+_APPENDED = re.compile(rb'<DataArray[^>]* offset="(\d{1,15})"')
 _TURNED_WEDGE = [3, 4, 5, 0, 1, 2]
 _EMPTY = ("meshio", "gmsh:", "medit", "avsucd")     # beginnings of names that programs give by themselves
 _TERM = re.compile(r"\s*([xyz])\s*([<>])\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -118,8 +123,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
 def _read(path: Path) -> "meshio.Mesh":
     import meshio
 
-    check_input(path, "mesh", missing="there is no such mesh file.")
-    check(path, foreign=True)
+    check_mesh_file(path, foreign=True)
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):     # meshio prints errors itself
             return meshio.read(path)
@@ -127,6 +131,31 @@ def _read(path: Path) -> "meshio.Mesh":
         known = "give VTU, or another volume mesh that meshio reads, such as Gmsh or Abaqus"
         problem = " ".join(str(error).split())[:120] or type(error).__name__
         raise InputError(f"{path}: not readable as a mesh of elements ({problem}); {known}.") from None
+
+
+def check_mesh_file(path: str | Path, *, foreign: bool = False) -> None:
+    """Refuse a file of elements that is missing, too large (packed arrays as large as they unpack) or damaged since it was written.
+
+    foreign: it may be of another program, which writes no checksum
+    """
+    check_input(path, "mesh", missing="there is no such mesh file.")
+    check(path, foreign=foreign)
+    if Path(path).suffix.lower() == ".vtu":
+        check_limit(path, "mesh", _unpacked_bytes(Path(path).read_bytes()))
+
+
+def _unpacked_bytes(content):
+    """Bytes of all packed arrays of a VTU file as their headers state them: number, size and last size of their blocks."""
+    kind = _PACKED.search(content)
+    if kind is None:
+        return len(content)
+    form = "<" if b'"LittleEndian"' in kind[0] else ">"
+    form += "3Q" if b'"UInt64"' in kind[0] else "3I"
+    size, first = struct.calcsize(form), content.find(b"_", content.find(b"<AppendedData")) + 1
+    heads = [base64.b64decode(found[1][:size * 4 // 3]) for found in _INLINE.finditer(content)]
+    heads += [content[first + int(found[1]):][:size] for found in _APPENDED.finditer(content)]
+    blocks = (struct.unpack(form, head) for head in heads if len(head) == size)
+    return sum(number * full if last == 0 else (number - 1) * full + last for number, full, last in blocks)
 
 
 def _dimension(kind):

@@ -70,11 +70,8 @@ def open_sequences(paths: Sequence[str | Path], *, split: str, longest_only: boo
     import h5py
 
     grey, image, first, length, offset = [], [], [], [], 0
+    whole = sum(_bytes_of(path) for path in paths) < _IN_MEMORY_BYTES
     for path in paths:
-        check_input(path, "arrays")
-    whole = sum(Path(path).stat().st_size for path in paths) < _IN_MEMORY_BYTES
-    for path in paths:
-        check(path)
         with in_one_sentence(path, "not a file of image sequences", "press the objects again"):
             file = h5py.File(path, "r")
             parts = [file[name] for name in _VARIABLES]
@@ -91,6 +88,13 @@ def open_sequences(paths: Sequence[str | Path], *, split: str, longest_only: boo
     kept = np.array(length) == max(length) if longest_only else np.ones(len(first), dtype=bool)
     origin = digest([[Path(path).name, Path(path).stat().st_size] for path in paths])
     return ImageSequences(grey, image, np.array(first)[kept], np.array(length)[kept], origin)
+
+
+def _bytes_of(path):
+    """Size of a file, after a check of its checksum."""
+    check_input(path, "arrays")
+    check(path)
+    return Path(path).stat().st_size
 
 
 def to_network(images: np.ndarray) -> torch.Tensor:

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softtact.checksums import check
 from softtact.errors import InputError
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.mesh_files import check_mesh_file, write_mesh
 from softtact.files import atomic_path
-from softtact.inputs import check_input, in_one_sentence
+from softtact.inputs import in_one_sentence
 from softtact.models.solid.result import SolidFields
 from softtact.press.objects import PlacedObject
 
@@ -121,8 +120,7 @@ def read_vtu(path: str | Path) -> PressedMesh:
     """The `PressedMesh` of a file that `PressedMesh.write` wrote; its pressures are left out."""
     from meshio import vtu
 
-    check_input(path, "mesh")
-    check(path)
+    check_mesh_file(path)
     with in_one_sentence(path, "not readable as VTU", "write it again"):
         mesh = vtu.read(path)
     load_steps = sorted((int(match[2] or 0), float(match[1]), name)

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.mesh_files import read_mesh_file
+from softtact.fem.mesh_files import check_mesh_file, read_mesh_file
 from softtact.fem.solid_mesh import outer_triangles
 from softtact.files import atomic_path, read_dataset
 from softtact.press.objects import PlacedObject
@@ -53,7 +53,8 @@ def read_view(path: str | Path) -> PressView:
         raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press, or the .csv of a "
                          "recording.")
     if ending == ".vtu":
-        of_solids = path.is_file() and b'"region:' in path.read_bytes()
+        check_mesh_file(path)
+        of_solids = b'"region:' in path.read_bytes()
         return _of_solids_vtu(path) if of_solids else _of_mesh(path, read_vtu(path))
     if ending == ".npz" or "node_mm" in (data := read_dataset(path)) and "deformation_map_mm" not in data:
         return _of_result(path)

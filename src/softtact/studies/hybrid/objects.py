@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.inputs import check_input
 from softtact.studies.configuration import refuse_unknown, validated
 from softtact.studies.hybrid.keys import CENTRED, CatalogueEntry, ItemSet
 
@@ -78,6 +79,7 @@ def check_shapes(items_of: dict[str, dict[str, Item]]) -> None:
     """Refuse a mesh in two sets, even under two names: a test must not contain a shape of the training."""
     seen: dict[bytes, Item] = {}
     for item in (item for items in items_of.values() for item in items.values() if item.first):
+        check_input(item.file, "mesh")
         other = seen.setdefault(Path(item.file).read_bytes(), item)
         if other.set != item.set:
             raise InputError(f"{item.file}: {item.object!r} of the set {item.set} has the same mesh as {other.object!r} of the set "
