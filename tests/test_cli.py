@@ -21,13 +21,14 @@ from softtact import cli
 from softtact.cli import COMMANDS, main
 from softtact.commands import mesh as mesh_command
 from softtact.commands import press as press_command
-from softtact.commands.common import EXIT_STATUS
 from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
-from softtact.errors import ConvergenceError, InputError
+from softtact.errors import ConvergenceError, InputError, OutputError, WorkerError
+from softtact.exits import EXIT_STATUS
 from softtact.materials.readers import LAYOUTS
 from softtact.press.result import read_press
 from softtact.press.sensor import MODELS, Sensor
 from softtact.press.task import TOLERANCE_MM
+from softtact.processes import Terminated
 from softtact.sensors.library import material_file, sensor_file
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -149,7 +150,9 @@ def test_json_stands_alone_on_stdout_and_messages_on_stderr(capsys, tmp_path):
 def test_what_stops_a_command_has_its_exit_status(refused, monkeypatch):
     for fault, status in [
         (ConvergenceError("The load step of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
-        (OSError(28, "No space left on device", "press.nc"), 4),
+        (OSError(28, "No space left on device", "press.nc"), 4), (OutputError("press.nc: cannot be written."), 4),
+        (WorkerError("A process was killed."), 4), (Terminated(), 143), (OSError(12, "Cannot allocate memory"), 4),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 8 bytes."), 4),
     ]:
         def stop(options, fault=fault):
             raise fault

@@ -12,10 +12,10 @@ MOST_LINES = 500
 # other.
 ORDER = (
     ("errors",),
-    ("unknown_names", "progress", "devices"),
+    ("unknown_names", "progress", "devices", "processes"),
     ("checksums", "inputs"),
     ("outputs",),
-    ("files", "drawing"),
+    ("files", "drawing", "exits"),
     ("tables",),
     ("linalg", "geometry", "materials"),
     ("sensors", "contact", "fem"),

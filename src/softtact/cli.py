@@ -1,6 +1,6 @@
 """The command `softtact`: its commands are the modules of `softtact.commands`.
 
-An error that the user can correct ends with one sentence on stderr and an exit status (`softtact.commands.common.EXIT_STATUS`).
+An error that the user can correct ends with one sentence on stderr and an exit status (`softtact.exits`).
 The commands import heavy packages inside their functions, so that `softtact --help` answers at once.
 """
 
@@ -31,7 +31,7 @@ from softtact.commands import (
     view,
 )
 from softtact.commands.common import EXIT_TEXT
-from softtact.errors import ConvergenceError, SofttactError, missing_extra
+from softtact.exits import run_to_status
 
 COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, calibrate_camera, predict, fit, mesh, export_deck,
             detect_discs, cost, stage, completion)
@@ -55,30 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         argcomplete.autocomplete(parser)
     options = parser.parse_args(arguments)
     options.given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        options.run(options)
-    except ConvergenceError as error:
-        return _refused(options, error, status=3)
-    except SofttactError as error:
-        return _refused(options, error, status=1)
-    except ModuleNotFoundError as error:
-        sentence = missing_extra(error)
-        if sentence is None:
-            raise
-        return _refused(options, sentence, status=1)
-    except BrokenPipeError:     # `| head` has closed the pipe; the rest of the buffer must not raise at the end
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        place = error.filename or "a file"
-        return _refused(options, f"{place}: {error.strerror or error}; make room or choose another place.", status=4)
-    except KeyboardInterrupt:
-        return _refused(options, "interrupted; what was reached is written and shown, no half-written file is left.", status=130)
-    return 0
-
-
-def _refused(options, sentence, *, status):
-    print(f"softtact {options.command}: {sentence}", file=sys.stderr)
-    return status
+    return run_to_status(f"softtact {options.command}", lambda: options.run(options))
 
 
 class _Parser(argparse.ArgumentParser):

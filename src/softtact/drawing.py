@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from softtact.processes import run_tied
 from softtact.progress import announce
 
 
@@ -16,7 +17,7 @@ def drawn_apart(command: Sequence[str], folder: Path, *, sentence: str, timeout_
     Returns None, and prints `sentence` on stderr, if the command fails or takes longer than `timeout_s`.
     """
     try:
-        done = subprocess.run([*command, str(folder)], capture_output=True, text=True, timeout=timeout_s, env=environment)
+        done = run_tied([*command, str(folder)], capture_output=True, text=True, timeout=timeout_s, env=environment)
     except subprocess.TimeoutExpired:
         announce(f"{sentence} (no answer within {timeout_s:g} s).")
         return None

@@ -30,6 +30,12 @@ class OutputError(SofttactError):
     status = 4
 
 
+class WorkerError(SofttactError):
+    """A process that worked for this one was killed."""
+
+    status = 4
+
+
 class ConvergenceError(SofttactError):
     """A solver did not reach its tolerance; nothing of the unfinished step may be used.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softtact.errors import InputError
+from softtact.exits import EXIT_STATUS
 
 if TYPE_CHECKING:
     import trimesh
@@ -18,12 +19,6 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 UNITS = ("mm", "cm", "m", "inch", "in")
-EXIT_STATUS = {0: "done",
-               1: "refused: a file, a value or a combination of options is not usable; one sentence says why and what to do",
-               2: "wrong command line: an option or an argument is missing, unknown or not of its kind",
-               3: "a press stopped before its last force; the forces before it were printed and written",
-               4: "a file could not be read or written: no space, no permission",
-               130: "interrupted; no half-written file is left"}
 EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, meaning in EXIT_STATUS.items())
 
 

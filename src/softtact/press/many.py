@@ -1,12 +1,9 @@
 """Many presses at once: in parallel processes that share the sensor's prepared models, or as one batch on a GPU."""
 
-import multiprocessing
 import time
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +22,7 @@ from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
 from softtact.press.task import cores
 from softtact.press.validity import flag_buried
+from softtact.processes import map_in_processes
 from softtact.progress import progress
 
 if TYPE_CHECKING:
@@ -155,22 +153,7 @@ def _read(sensor, press, underside, force_n, job):
 def _each(sensor, act, jobs, workers):
     """act(sensor, job) of each job, in their order, in processes."""
     workers = min(workers, len(jobs))
-    if workers <= 1:
-        yield from (act(sensor, job) for job in jobs)
-        return
-    # A forked process shares the prepared arrays; without fork each process gets a copy.
-    context = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_store_sensor, initargs=(sensor,)) as pool:
-        yield from pool.map(_in_process, repeat(act), jobs, chunksize=max(1, len(jobs) // (8 * workers)))
-
-
-def _store_sensor(sensor):
-    global _sensor     # the one sensor of a process
-    _sensor = sensor
-
-
-def _in_process(act, job):
-    return act(_sensor, job)
+    return map_in_processes(partial(act, sensor), jobs, workers=workers) if workers > 1 else (act(sensor, job) for job in jobs)
 
 
 def _pressed(sensor, job, *, force_n, model, options):

@@ -9,27 +9,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from softtact.errors import InputError, SofttactError, missing_extra
+from softtact.errors import InputError
+from softtact.exits import run_to_status
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the stage that the command line names; return its exit status."""
     options = add_arguments(argparse.ArgumentParser(prog="softtact stage", description=__doc__)).parse_args(arguments)
-    try:
-        run_stage(options)
-    except SofttactError as error:
-        return _refused(options, error)
-    except ModuleNotFoundError as error:
-        sentence = missing_extra(error)
-        if sentence is None:
-            raise
-        return _refused(options, sentence)
-    return 0
-
-
-def _refused(options, sentence):
-    print(f"softtact {options.stage}: {sentence}", file=sys.stderr)
-    return 1
+    return run_to_status(f"softtact {options.stage}", lambda: run_stage(options))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:

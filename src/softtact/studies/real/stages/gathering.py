@@ -1,7 +1,6 @@
 """Measured data, copied into the study with its source and checksum."""
 
 import hashlib
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -17,6 +16,7 @@ from softtact.files import atomic_path, write_csv, write_json
 from softtact.imaging.ball_presses import BallPress, Gel
 from softtact.imaging.marker_motion import COLUMNS, MarkerMotion
 from softtact.imaging.shading import PhongShading
+from softtact.processes import run_tied
 from softtact.studies.real.config import gel_data
 
 WHEEL = "taxim==1.4.1"
@@ -73,7 +73,7 @@ def _wheel(folder):
         return found[0]
     place.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:", "--dest", str(place), WHEEL]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    ended = run_tied(command, capture_output=True, text=True, check=False)
     if not (found := sorted(place.glob("taxim-1.4.1-*.whl"))):
         said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
         raise InputError(f"{place}: pip could not download {WHEEL} ({said}); put its wheel (27 MB) there, state its "

@@ -1,0 +1,111 @@
+"""Processes that work for this one: they end with it, whatever ends it, and one that is killed is reported in a sentence."""
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from types import FrameType
+from typing import Any, TypeVar
+
+from softtact.errors import WorkerError
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+_PR_SET_PDEATHSIG = 1     # of Linux' prctl: the signal that a process gets when the thread that started it ends
+_LOOK_EVERY_S = 0.5       # for the parent, where there is no prctl
+# Another program's process: asks for the signal, which survives exec, and becomes the program.
+_TIED = (f"import ctypes, os, sys; sys.platform == 'linux' and ctypes.CDLL(None).prctl({_PR_SET_PDEATHSIG}, {signal.SIGKILL:d}); "
+         "os.getppid() == int(sys.argv[1]) and os.execvp(sys.argv[2], sys.argv[2:])")
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM: whatever an interrupt (Ctrl-C) keeps, shows and tidies up, this does, too."""
+
+
+@contextlib.contextmanager
+def sigterm_interrupts() -> Iterator[None]:
+    """Within the block SIGTERM raises `Terminated` in the main thread, as Ctrl-C raises KeyboardInterrupt."""
+    if threading.current_thread() is not threading.main_thread():     # Python lets no other thread set a handler
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise Terminated
+
+
+def end_with(parent: int) -> None:
+    """Let the operating system kill this process when `parent`, the process that started it, ends, be it by SIGKILL."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    threading.Thread(target=_look_for, args=(parent,), daemon=True).start()     # also if it has ended before the line above
+
+
+def _look_for(parent):
+    while os.getppid() == parent:
+        time.sleep(_LOOK_EVERY_S)
+    os._exit(1)
+
+
+def run_tied(command: Sequence[str], **options: Any) -> subprocess.CompletedProcess:
+    """`subprocess.run` of a command that ends with this process (on Linux)."""
+    return subprocess.run([sys.executable, "-I", "-S", "-c", _TIED, str(os.getpid()), *command], **options)
+
+
+def call_apart(function: Callable[..., _Result], *arguments: Any) -> _Result:
+    """function(*arguments), called in a process of its own: for code of other programs that crashes, cannot be interrupted, or
+    writes into the working folder."""
+    result, = map_in_processes(partial(_call, function), [arguments], workers=1)
+    return result
+
+
+def _call(function, arguments):
+    return function(*arguments)
+
+
+def map_in_processes(function: Callable[[_Item], _Result], items: Sequence[_Item], *, workers: int) -> Iterator[_Result]:
+    """function(item) of each item, in their order, in processes that end at once if the caller stops or ends.
+
+    A forked process shares the arrays that `function` holds; where there is no fork, each process gets a copy.
+    Raises WorkerError if a process is killed, as Linux does where memory runs out.
+    """
+    context = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(function, os.getpid()))
+    try:
+        yield from pool.map(_work, items, chunksize=max(1, len(items) // (8 * workers)))
+    except BrokenProcessPool:
+        raise WorkerError(f"One of {workers} processes was killed, most likely because memory ran out; run again with fewer "
+                          "processes (workers) or smaller meshes.") from None
+    except BaseException:
+        for process in list((pool._processes or {}).values()):     # an executor would wait for them; Python 3.14: kill_workers()
+            process.kill()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin(function, parent):
+    """Prepare a new process: the parent reacts to Ctrl-C, and ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with(parent)
+    global _function     # the one that a process calls
+    _function = function
+
+
+def _work(item):
+    return _function(item)
