@@ -16,7 +16,6 @@ from softtact.robot.events import (
     read_events,
     record_of,
     to_dataset,
-    with_friction,
     write_events,
 )
 from softtact.robot.grasp import GraspRun
@@ -113,7 +112,7 @@ def test_the_shear_of_an_event_is_pressed_where_it_is_asked_for(record):
     np.testing.assert_allclose(maps.pressed_shear_n, [[[0, 0], [0, 0]], [[0, -0.3], [0, 0]]], atol=4e-3)
     np.testing.assert_allclose(maps.pressed_force_n, [[0.5, 0.5], [1, 1]], rtol=1e-3)
     left, right = maps.deformation_map_mm[1]
-    alone = press_with_shear(with_friction(pad, 0.8), ball, Pose(np.array([0.0, 0.0, 4.0])), force_n=1.0,
+    alone = press_with_shear(pad.with_friction(0.8), ball, Pose(np.array([0.0, 0.0, 4.0])), force_n=1.0,
                              shear_n=np.array([0.0, -0.3]), threads=1).result
     np.testing.assert_array_equal(left, alone.deformation_map_mm[-1])
     assert np.abs(left - alone.deformation_map_mm[0]).max() > 0.005 * right.max()      # shear is in it

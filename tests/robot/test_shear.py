@@ -6,12 +6,12 @@ import trimesh
 
 import softtact
 from softtact.errors import InputError
-from softtact.robot.events import press_with_shear, with_friction
+from softtact.robot.events import press_with_shear
 
 
 @pytest.fixture(scope="module")
 def sensor():
-    return with_friction(softtact.load_sensor("pad4x4"), 0.5)
+    return softtact.load_sensor("pad4x4").with_friction(0.5)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -134,6 +134,13 @@ class Sensor:
         if len(meshes) != len(places):
             raise InputError(f"There are {len(meshes)} meshes and {len(places)} poses; give one pose for each mesh, or one mesh.")
         return press_many(self, list(zip(meshes, places, strict=True)), Batch.of(self.checked_forces(force_n), model, options))
+
+    def with_friction(self, coefficient: float) -> "Sensor":
+        """The sensor with Coulomb's coefficient of an object on its surface, from 0 on. Raises InputError for another number."""
+        if not 0 <= coefficient < float("inf"):
+            raise InputError(f"friction {coefficient:g}: give a number from 0 on.")
+        friction = self.spec.friction.model_copy(update={"object": float(coefficient)})
+        return replace(self, spec=self.spec.model_copy(update={"friction": friction}))
 
     def prepared(self, model: str, threads: int = 1) -> Any:
         """Prepared data of a fast model: `Compliance`, `WideLayer` of a gel, or `FoundationCompliance`, computed on first use."""

@@ -6,7 +6,7 @@ displacement at which friction carries the shear.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,12 +75,6 @@ class ShearPress:
     def shear_n(self) -> np.ndarray:
         """Force (2,) in N of the object on the sensor along x and y."""
         return np.asarray(self.result.force_n)[-1, :2]
-
-
-def with_friction(sensor: "Sensor", coefficient: float) -> "Sensor":
-    """The sensor with Coulomb's coefficient of an object on its surface."""
-    friction = sensor.spec.friction.model_copy(update={"object": coefficient})
-    return replace(sensor, spec=sensor.spec.model_copy(update={"friction": friction}))
 
 
 def press_with_shear(sensor: "Sensor", mesh: trimesh.Trimesh, pose: Pose | None, *, force_n: float, shear_n: np.ndarray,
@@ -182,7 +176,7 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
         raise InputError(f"model={model!r}: shear is pressed with {' or '.join(SHEAR_MODELS)}; name one of them.")
     for event, finger in np.argwhere(sheared):
         pose = set_down(mesh, pose_of(poses[event, finger]))
-        pressed = press_with_shear(with_friction(sensor, float(friction)), mesh, pose, force_n=float(forces[event, finger]),     # type: ignore[arg-type]
+        pressed = press_with_shear(sensor.with_friction(friction), mesh, pose, force_n=float(forces[event, finger]),     # type: ignore[arg-type]
                                    shear_n=shears[event, finger], model=model, threads=workers)
         _keep(maps, (event, finger), pressed.result, step=-1)
         maps.pressed_shear_n[event, finger] = pressed.shear_n

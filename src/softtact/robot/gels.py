@@ -24,7 +24,7 @@ from softtact.press.gel import gel_result
 from softtact.press.kinds import layers_at_rest
 from softtact.press.sensor import Sensor
 from softtact.readout.registry import readings_of
-from softtact.robot.events import FINGERS, pose_of, set_down, with_friction
+from softtact.robot.events import FINGERS, pose_of, set_down
 
 _TOUCH_N = 0.02           # normal force below which a gel is free
 _CORRECTIONS = 3          # of the displacement aside in one call, and
@@ -127,7 +127,7 @@ class GelReadings:
             raise InputError(f"model={self.model!r}: a gel with a camera has the elastic model alone in the environment; use "
                              "'elastic'.")
         self.sensor.checked_forces(self.largest_force_n)
-        self.sensor = with_friction(self.sensor, self.friction)
+        self.sensor = self.sensor.with_friction(self.friction)
         at_rest = readings_of(self.sensor.readouts, layers_at_rest(self.sensor))
         self._at_rest = {name: np.asarray(values)[0] for name, values in at_rest.items()}
 
