@@ -118,3 +118,13 @@ def test_an_unknown_kind_is_answered_with_the_nearest_one(tmp_path):
     (tmp_path / "a.yaml").write_text(yaml.safe_dump({"study": "a", "kind": "grasp"}))
     with pytest.raises(InputError, match="'grasp'.*'grasps'"):
         open_study(tmp_path / "a.yaml")
+
+
+def test_a_stage_is_told_of_an_empty_list_too(monkeypatch):
+    from softtact.studies import __main__ as runner
+
+    told = {}
+    monkeypatch.setattr(module, "find_stage", lambda stage: lambda **job: told.update(job["inputs"]))
+    assert runner.main(["real.judge_markers", "--in", "gel=gel.json", "--in", "others[]=", "--in", "more[]=a.csv"]) == 0
+    assert told["others"] == [] and [path.name for path in told["more"]] == ["a.csv"]
+    assert runner.main(["real.judge_markers", "--in", "gel="]) == 1     # a single path is never empty

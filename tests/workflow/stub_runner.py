@@ -18,7 +18,7 @@ DAMAGED = b"half of a f"     # refused, as a stage refuses what it cannot read
 def main(arguments):
     stage, options = arguments[0], arguments[1:]
     pairs = list(zip(options[::2], options[1::2], strict=True))
-    inputs = [value.partition("=")[2] for option, value in pairs if option == "--in"]
+    inputs = [path for path in (value.partition("=")[2] for option, value in pairs if option == "--in") if path]
     settings = dict(pairs)["--settings"]
     digest = hashlib.sha256((stage + settings).encode())
     for path in inputs:

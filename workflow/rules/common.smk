@@ -64,11 +64,11 @@ def files(wildcards, input, output):
 
 
 def _arguments(option, named):
-    """[option, name=path, ...]; a list of paths is marked as one, however short."""
+    """[option, name=path, ...]; a list of paths is marked as one, however short, and `name[]=` is an empty one."""
     arguments = []
     for name, paths in named.items():
         single = isinstance(paths, str)
-        for path in [paths] if single else paths:
+        for path in [paths] if single else paths or [""]:
             arguments += [option, f"{name}={path}" if single else f"{name}[]={path}"]
     return arguments
 

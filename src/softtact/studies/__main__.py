@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument("stage", metavar="NAME",
                         help="KIND.NAME, a stage of a kind of study named as the workflow's rule; of the hybrid study NAME alone")
     parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
-                        help="an input file; a repeated name, or NAME[]=PATH, makes a list")
+                        help="an input file; a repeated name, or NAME[]=PATH, makes a list, and NAME[]= an empty one")
     parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH",
                         help="an output file; lists as for --in")
     parser.add_argument("--settings", default="{}", metavar="JSON", help="the values that the stage uses")
@@ -55,16 +55,16 @@ class _Named(dict):
 
 
 def _named_paths(pairs, *, option):
-    """{name: Path} of NAME=PATH arguments; a repeated name or NAME[] gives a list in the order given."""
+    """{name: Path} of NAME=PATH arguments; a repeated name or NAME[] gives a list in the order given, NAME[]= an empty one."""
     paths, lists = {}, set()
     for pair in pairs:
         key, _, path = pair.partition("=")
         name = key.removesuffix("[]")
-        if not name or not path:
+        if not name or (not path and key == name):
             raise InputError(f"{option} {pair}: write it as NAME=PATH.")
         if key != name or name in paths:
             lists.add(name)
-        paths.setdefault(name, []).append(Path(path))
+        paths.setdefault(name, []).extend([Path(path)] if path else [])
     return _Named(option, {name: found if name in lists else found[0] for name, found in paths.items()})
 
 
