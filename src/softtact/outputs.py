@@ -19,6 +19,7 @@ from softtact.errors import InputError, OutputError
 from softtact.inputs import no_name
 
 _OURS = re.compile(r"\.?softtact-([0-9a-f]{8})-(\d+)-.*")     # machine, process
+_LONGEST_NAME = 255      # bytes, on the file systems in use
 _LONGEST_ENDING = 20     # characters; longer ones are no file's kind, and would make a temporary name too long
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)     # errors of a file that is being written
 
@@ -29,6 +30,7 @@ def target_of(path: str | Path) -> Path:
     Raises InputError for what cannot become a file: a folder, a device, links in a circle, a name that is too long or cannot be
     encoded.
     """
+    _check_names(path)
     try:
         mode = os.stat(path).st_mode
         if not stat.S_ISREG(mode):
@@ -55,12 +57,11 @@ def check_outputs(*paths: str | Path | None) -> None:
 
 def check_output_folder(path: str | Path) -> None:
     """Refuse a folder for results that cannot be made, or in which no file can be written, before any work."""
+    _check_names(path)
     try:
         os.stat(path)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         pass
-    except NotADirectoryError:
-        raise not_written(path, OSError(errno.ENOTDIR, "a part of its path is a file, not a folder")) from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: {no_name(error)}.") from None
     whole = Path(os.path.realpath(path))
@@ -68,6 +69,16 @@ def check_output_folder(path: str | Path) -> None:
     if not there.is_dir():
         raise InputError(f"{path}: {there} is a file; give another name for the folder.")
     _try(path, there)
+
+
+def _check_names(path):
+    """Refuse a path with a name that is too long, whether or not the folders before it exist."""
+    try:
+        longest = max((len(os.fsencode(part)) for part in Path(path).parts), default=0)
+    except UnicodeError as error:
+        raise InputError(f"{path}: {no_name(error)}.") from None
+    if longest > _LONGEST_NAME:
+        raise InputError(f"{path}: {no_name(OSError(errno.ENAMETOOLONG, ''))}.")
 
 
 def _try(path, folder):
@@ -101,7 +112,7 @@ def _same_file(one, other):
     """Whether two paths lead to the same file, existing or not."""
     try:
         return os.path.samefile(one, other)
-    except OSError:
+    except (OSError, ValueError):
         return os.path.realpath(one) == os.path.realpath(other)
 
 

@@ -4,8 +4,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from softtact.commands.common import UNITS, add_command, check_folders, check_names, sensor_path, sensor_spec, show
+from softtact.commands.common import UNITS, add_command, check_names, sensor_path, sensor_spec, show
 from softtact.errors import InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
   softtact calibrate plate.csv --press plate.stl --unit mm --force 20 --out mine.yaml --report mine.html
@@ -78,9 +79,8 @@ def _calibrate(options):
 
 def _checked(options):
     """(recording, mesh, force, place) of each recording as stated. Raises InputError for outputs that would overwrite an input."""
-    from softtact.outputs import refuse_overwriting
 
-    check_folders(options.out, options.report)
+    check_outputs(options.out, options.report)
     check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})
     count = len(options.recordings)
     meshes, forces, places = (_for_each(name, getattr(options, name), count) for name in ("press", "force", "place"))

@@ -4,8 +4,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softtact.commands.common import add_command, check_folders, check_names, sensor_path, show
+from softtact.commands.common import add_command, check_names, sensor_path, show
 from softtact.errors import InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 if TYPE_CHECKING:
     from softtact.calibration.camera import CameraCalibration
@@ -39,11 +40,10 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _calibrate(options):
-    from softtact.outputs import refuse_overwriting
     from softtact.sensors.base import read_mapping
 
     files = _outputs(options.out)
-    check_folders(options.out)
+    check_outputs(*files.values())
     check_names({options.out: (".yaml", ".yml")})
     refuse_overwriting([*options.images, options.background, options.circles, sensor_path(options.sensor)], files)
     for name in ("ball_mm", "mm_per_px"):

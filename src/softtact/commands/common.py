@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -101,15 +100,6 @@ def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
 
     return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "unit": options.unit,
             "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *options.given])}
-
-
-def check_folders(*paths: Path | None) -> None:
-    """Refuse output files whose folder is missing or not writable, before a long press."""
-    for path in paths:
-        if path and not path.parent.is_dir():
-            raise InputError(f"{path}: there is no folder {path.parent}; create it first.")
-        if path and not os.access(path.parent, os.W_OK):
-            raise InputError(f"{path}: the folder {path.parent} is not writable; choose another.")
 
 
 def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:

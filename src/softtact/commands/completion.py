@@ -5,7 +5,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from softtact.commands.common import add_command, check_folders
+from softtact.commands.common import add_command
+from softtact.outputs import check_outputs
 
 SHELLS = ("bash", "zsh", "fish")
 KINDS = ("study", "sensor", "material")
@@ -42,7 +43,7 @@ def _completion(options):
 def _schema(options):
     from softtact.files import write_json
 
-    check_folders(options.out)
+    check_outputs(options.out)
     if options.out:
         write_json(options.out, schema_of(options.kind))
     else:

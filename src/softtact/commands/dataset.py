@@ -4,9 +4,10 @@ import argparse
 from pathlib import Path
 
 import softtact
-from softtact.commands.common import UNITS, add_command, add_repair, check_folders, check_forces, read_object, sensor_spec, show
+from softtact.commands.common import UNITS, add_command, add_repair, check_forces, read_object, sensor_spec, show
 from softtact.commands.press_each import MESHES
 from softtact.errors import InputError
+from softtact.outputs import check_outputs
 
 EXAMPLES = """
   softtact dataset part.stl --unit mm --presses 100 --out data.h5
@@ -46,7 +47,7 @@ def _dataset(options):
     from softtact.progress import announce
     from softtact.studies.cost import read_costs
 
-    check_folders(options.out)
+    check_outputs(options.out)
     check_name(options.out, options.format)
     spec = sensor_spec(options.sensor)
     forces = sorted(set(options.force or [force for force in _FORCES_N if force <= spec.force_range_n[1]]))

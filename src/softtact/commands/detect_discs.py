@@ -4,8 +4,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from softtact.commands.common import add_command, check_folders, show
+from softtact.commands.common import add_command, show
 from softtact.errors import InputError
+from softtact.outputs import check_outputs
 
 EXAMPLES = """
   softtact detect-discs press.mp4 --pixel-mm 0.03 --out discs.csv
@@ -36,7 +37,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _detect_discs(options):
     pixel_mm = _pixel_mm(options)
     _check_detect_discs(options)
-    check_folders(options.out, options.picture)
+    check_outputs(options.out)
     from softtact.reporting.disc_report import report_discs
 
     picture = None if options.no_picture else options.picture or options.out.with_suffix("")

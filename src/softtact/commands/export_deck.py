@@ -9,7 +9,6 @@ from softtact.commands.common import (
     add_mesh,
     add_repair,
     any_sensor_spec,
-    check_folders,
     check_forces,
     pose_of,
     read_object,
@@ -17,6 +16,7 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
+from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
   softtact export-deck part.stl --unit mm --force 5 --format calculix --out press.inp
@@ -49,12 +49,11 @@ def _export_solid(options):
     """The deck of a press on a sensor of kind solid."""
     from softtact.contact.motion import Motion
     from softtact.decks.solid import export_solid
-    from softtact.outputs import refuse_overwriting
     from softtact.press.solid import body_of
 
     spec, forces, pose = any_sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     check_forces(forces, spec)
-    check_folders(options.out)
+    check_outputs(options.out)
     refuse_overwriting([options.mesh, sensor_path(options.sensor), *spec.paths], {"--out": options.out})
     mesh, repairs = read_object(options, options.mesh)
     sensor, motion = softtact.load_sensor(options.sensor), Motion().press(force_n=forces)
@@ -74,12 +73,11 @@ def _export_solid(options):
 def _export_layered(options):
     """The deck of the hyperelastic press on layers."""
     from softtact.geometry.meshes import check_over_sensor, place
-    from softtact.outputs import refuse_overwriting
 
     spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     spec.need_frusta("export-deck", "name a sensor of kind frusta")
     check_forces(forces, spec)
-    check_folders(options.out)
+    check_outputs(options.out)
     refuse_overwriting([options.mesh, sensor_path(options.sensor)], {"--out": options.out})
     mesh, repairs = read_object(options, options.mesh)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))

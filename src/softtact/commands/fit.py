@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from softtact.commands.common import add_command, check_folders, numbers, pairs, show
+from softtact.commands.common import add_command, numbers, pairs, show
 from softtact.errors import InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
   softtact fit uniaxial=tension.csv planar=shear.csv --law all --out card.json --plot card.png
@@ -55,9 +56,8 @@ def _fit(options):
     from softtact.materials.card_making import make_card, misfit_warnings
     from softtact.materials.making import curves_of
     from softtact.materials.readers import read_curves
-    from softtact.outputs import refuse_overwriting
 
-    check_folders(options.out, options.plot)
+    check_outputs(options.out, options.plot)
     config = _material(options)
     refuse_overwriting(_inputs(options, config), {"--out": options.out, "--plot": options.plot})
     if config is not None:

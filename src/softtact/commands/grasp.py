@@ -15,6 +15,7 @@ from softtact.commands.common import (
     show,
 )
 from softtact.errors import InputError
+from softtact.outputs import check_output_folder
 
 EXAMPLES = """
   softtact grasp part.stl --unit mm --force 20 --out results/grasp
@@ -67,8 +68,7 @@ def _grasp(options):
     import_mujoco()     # reports a missing extra at once
     from softtact.robot.events import write_events
 
-    if options.out.is_file():
-        raise InputError(f"--out {options.out}: it is a file; give a folder for the results of the grasp.")
+    check_output_folder(options.out)
     made = _replayed(options) if options.replay else _new(options)
     data, scene, record = made
     events = options.out / "events.nc"

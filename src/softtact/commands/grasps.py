@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from softtact.commands.common import add_command, show
-from softtact.errors import InputError
+from softtact.outputs import check_output_folder
 
 EXAMPLES = """
   softtact grasps config/grasps.yaml --cost                          # what is left to do, and how long it takes
@@ -32,8 +32,7 @@ def _grasps(options):
 
     opened = OpenStudy("grasps", KINDS["grasps"].call("load", KINDS["grasps"].call("read", options.config), options.config))
     folder = options.out or Path("results") / opened.name
-    if folder.is_file():
-        raise InputError(f"--out {folder}: it is a file; give a folder for the results.")
+    check_output_folder(folder)
     workers, measured = options.workers or cores(), read_costs()
     costs = opened.costs(measured, folder)
     if options.cost:

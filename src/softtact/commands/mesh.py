@@ -13,7 +13,6 @@ from softtact.commands.common import (
     add_command,
     add_mesh,
     add_repair,
-    check_folders,
     check_names,
     pairs,
     pose_of,
@@ -23,6 +22,7 @@ from softtact.commands.common import (
     show,
 )
 from softtact.errors import InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
   softtact mesh finger.stl --unit mm --size 0.8 --out finger.vtu
@@ -82,9 +82,8 @@ def _complexity(options):
 
 def _mesh(options):
     from softtact.fem.mesh_files import write_mesh
-    from softtact.outputs import refuse_overwriting
 
-    check_folders(options.out)
+    check_outputs(options.out)
     check_names({options.out: (".vtu",)})
     refuse_overwriting([options.mesh], {"--out": options.out})
     rules = dict(pairs("--face", options.face))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from softtact.commands.common import add_command, show
 from softtact.errors import InputError
+from softtact.outputs import check_output_folder
 
 EXAMPLES = """
   softtact palpate config/tiny_probe.yaml --out results/tiny_probe      # within a minute
@@ -26,8 +27,7 @@ def _palpate(options):
 
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")
-    if options.out.exists() and not options.out.is_dir():
-        raise InputError(f"--out {options.out}: it is a file; give a folder.")
+    check_output_folder(options.out)
     opened = open_study(options.design, kind="palpation")
     from softtact.files import read_json
     from softtact.studies.jobs import run_jobs

@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softtact.commands.common import add_command, check_folders, show
+from softtact.commands.common import add_command, show
 from softtact.errors import InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,9 +35,8 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _predict(options):
-    from softtact.outputs import refuse_overwriting
 
-    check_folders(options.out, options.plot)
+    check_outputs(options.out, options.plot)
     refuse_overwriting([options.maps, options.network], {"--out": options.out, "--plot": options.plot})
     if options.out and options.out.suffix not in WRITTEN:
         raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give a name with such an ending.")

@@ -12,7 +12,6 @@ from softtact.commands.common import (
     add_mesh,
     add_repair,
     any_sensor_spec,
-    check_folders,
     check_forces,
     check_names,
     origin,
@@ -25,6 +24,7 @@ from softtact.commands.common import (
 from softtact.commands.press_each import ON_LAYERS, ON_SOLIDS, Files, is_several, press_each
 from softtact.commands.press_gel import add_images, check_images, gel_lines, is_image, summary_of_gel, write_images
 from softtact.errors import ConvergenceError, InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 if TYPE_CHECKING:
     import trimesh
@@ -97,7 +97,6 @@ def _add_soft(command):
 
 
 def _press(options):
-    from softtact.outputs import refuse_overwriting
 
     spec, pose = any_sensor_spec(options.sensor), pose_of(options)
     _refuse_idle(options, spec)
@@ -108,7 +107,7 @@ def _press(options):
     how = _how(options, spec)
     several = is_several(options.mesh)
     if not several:
-        check_folders(options.out, options.vtu, options.plot, options.image, options.movie)
+        check_outputs(options.out, options.vtu, options.plot, options.image, options.movie)
     cards = [path for _, path in pairs("--card", options.card)] + ([options.object_law] if options.object_law else [])
     refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards, *spec.paths],
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot, "--image": options.image,

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from softtact.commands.common import check_folders, show
+from softtact.commands.common import show
 from softtact.errors import ConvergenceError, InputError, SofttactError
+from softtact.outputs import check_output_folder
 from softtact.progress import announce
 
 MESHES = (".stl", ".obj", ".ply")
@@ -120,9 +121,9 @@ def _folder(options):
     """The folder for all results."""
     if options.out is None:
         raise InputError("--out is missing: each of several objects gets a folder of results; give --out a folder for them.")
-    if options.out.suffix.lower() == ".nc" or options.out.is_file():
+    if options.out.suffix.lower() == ".nc":
         raise InputError(f"--out {options.out}: each of several objects gets a folder of results; give --out a folder for them.")
-    check_folders(options.out)
+    check_output_folder(options.out)
     for name in _PICTURES:
         path = getattr(options, name)
         if path and path.parent != Path("."):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from softtact.commands.common import add_command, show
 from softtact.errors import InputError
+from softtact.outputs import check_output_folder
 
 EXAMPLES = """
   softtact skin config/skin.yaml --out results/skin
@@ -40,8 +41,7 @@ def _skin(options):
     opened = open_study(options.design, kind="skin")
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")
-    if options.out.exists() and not options.out.is_dir():
-        raise InputError(f"--out {options.out}: it is a file, and the results need a folder; choose another name.")
+    check_output_folder(options.out)
     from softtact.files import read_json
     from softtact.studies.jobs import run_jobs
 

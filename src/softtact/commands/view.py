@@ -6,8 +6,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from softtact.commands.common import add_command, check_folders, check_names, show
+from softtact.commands.common import add_command, check_names, show
 from softtact.errors import InputError
+from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
   softtact press part.stl --unit mm --force 5 --force 20 --model elastic --out press.nc --vtu press.vtu
@@ -34,10 +35,9 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _view(options):
-    from softtact.outputs import refuse_overwriting
     from softtact.reporting.press_view import read_view, save_picture, write_page
 
-    check_folders(options.save, options.page)
+    check_outputs(options.save, options.page)
     refuse_overwriting([options.result, options.force_log], {"--save": options.save, "--page": options.page})
     if options.result.suffix.lower() == ".csv":
         return _view_recording(options)

@@ -3,7 +3,6 @@
 import itertools
 import os
 import shutil
-import tempfile
 import warnings
 from collections.abc import Sequence
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from softtact.files import write_csv
 from softtact.imaging.discs import discs_and_outlines
 from softtact.imaging.light import grey
 from softtact.imaging.reading import image_files, is_lossy, read_frames
-from softtact.outputs import refuse_overwriting
+from softtact.outputs import check_output_folder, check_outputs, refuse_overwriting, target_of, temporary_folder
 from softtact.progress import progress
 from softtact.reporting.style import pyplot, save
 
@@ -104,7 +103,7 @@ def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | N
     stream = _collecting(read_frames(frames, every=every), warned, encoding=transfer is None)
     first = list(itertools.islice(stream, 2))   # one frame or several, without reading all
     target = _picture_path(picture, single=len(first) == 1)
-    _refuse_overwriting(frames, out, target)
+    _check_places(frames, out, target)
     tables, rows = [], []
     with _pictures(target) as drawn:
         for name, frame in progress(itertools.chain(first, stream), label="discs in frames", total="?"):
@@ -168,14 +167,16 @@ def _picture_path(picture, *, single):
         return picture if picture.suffix.lower() == ".png" else picture.with_name(f"{picture.name}.png")
     if picture.suffix.lower() == ".png":
         raise InputError(f"{picture}: there are several frames, with a picture each; give --picture a folder.")
-    if picture.is_file():
-        raise InputError(f"{picture}: it is a file, but several pictures need a folder; give --picture another name.")
     return picture
 
 
-def _refuse_overwriting(frames, out, target):
-    """Refuse a table or pictures that would overwrite frames."""
+def _check_places(frames, out, target):
+    """Refuse a table or pictures that cannot be written, or would overwrite frames."""
     files = image_files(frames)
+    single = target is not None and target.suffix.lower() == ".png"
+    check_outputs(out, target if single else None)
+    if target is not None and not single:
+        check_output_folder(target)
     folder = target is not None and target.is_dir()
     refuse_overwriting(files, {"--out": Path(out), "--picture": None if folder else target})
     if folder and len(files) > 1 and target.samefile(files[0].parent):
@@ -193,11 +194,11 @@ def _pictures(target):
     if target is None:
         yield None
         return
-    with tempfile.TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
-        yield Path(folder)
-        drawn = sorted(Path(folder).iterdir())
+    with temporary_folder(target.parent) as folder:
+        yield folder
+        drawn = sorted(folder.iterdir())
         if target.suffix.lower() == ".png":
-            os.replace(drawn[0], target)
+            os.replace(drawn[0], target_of(target))
             return
         target.mkdir(exist_ok=True)
         for file in drawn:

@@ -6,7 +6,6 @@ separate process, `python -m softtact.reporting.render FOLDER`, with a time limi
 
 import json
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.drawing import drawn_apart
+from softtact.outputs import temporary_folder
 
 if TYPE_CHECKING:
     import trimesh
@@ -56,9 +56,9 @@ def part_of(mesh: "trimesh.Trimesh", **look: Any) -> Part:
 
 def rendered(views: Sequence[View], *, size: tuple[int, int] = (900, 675), timeout_s: float = TIMEOUT_S) -> list[np.ndarray] | None:
     """Images (h, w, 3) of the views, 0 to 255, or None if rendering failed, with a sentence on stderr."""
-    with tempfile.TemporaryDirectory(prefix="softtact-render-") as folder:
-        _write(views, size, Path(folder))
-        images = drawn_apart(_COMMAND, Path(folder), sentence=FALLBACK, timeout_s=timeout_s)
+    with temporary_folder() as folder:
+        _write(views, size, folder)
+        images = drawn_apart(_COMMAND, folder, sentence=FALLBACK, timeout_s=timeout_s)
     return None if images is None else [images[f"view{k}"] for k in range(len(views))]
 
 

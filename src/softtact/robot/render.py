@@ -7,7 +7,6 @@ no picture of the robot.
 
 import os
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from softtact.drawing import drawn_apart
+from softtact.outputs import temporary_folder
 from softtact.press.plot import save
 from softtact.robot.arm import JOINTS
 from softtact.robot.events import GraspRecord
@@ -37,11 +37,11 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
     view: azimuth and elevation in degrees, distance in m, towards the hand or, beyond 1 m, the middle of the arm
     """
     states = np.array([state_of(scene, record, row) for row in rows])
-    with tempfile.TemporaryDirectory(prefix="softtact-grasp-") as folder:
-        mujoco.mj_saveModel(scene.model, str(Path(folder, "scene.mjb")), None)
-        np.savez(Path(folder, "states.npz"), qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
+    with temporary_folder() as folder:
+        mujoco.mj_saveModel(scene.model, str(folder / "scene.mjb"), None)
+        np.savez(folder / "states.npz", qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
         environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
-        images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], Path(folder), sentence=_NO_PICTURE,
+        images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], folder, sentence=_NO_PICTURE,
                              timeout_s=timeout_s, environment=environment)
     return None if images is None else images["images"]
 

@@ -34,11 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 def run_stage(options: argparse.Namespace) -> None:
     """Import the stage and call it."""
-    from softtact.outputs import refuse_overwriting
+    from softtact.outputs import check_output_folder, refuse_overwriting, target_of
     from softtact.studies.jobs import find_stage
 
     run = find_stage(options.stage if "." in options.stage else f"hybrid.{options.stage}")
     inputs, outputs = _named_paths(options.inputs, option="--in"), _named_paths(options.outputs, option="--out")
+    for _, path in _flat(outputs):
+        check_output_folder(path if path.is_dir() else target_of(path).parent)
     refuse_overwriting((path for _, path in _flat(inputs)), dict(_flat(outputs)))
     run(inputs=inputs, outputs=outputs, settings=_settings(options.settings), threads=options.threads)
 
