@@ -5,9 +5,11 @@ may also end a VTU file. A program that changes such a file writes its end anew,
 checksum, and is read with a word on stderr. Text for people (CSV, JSON, YAML) has none, since it is meant to be edited.
 """
 
+import contextlib
 import hashlib
 import os
 import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import BinaryIO
@@ -28,11 +30,17 @@ def seal(path: str | Path) -> None:
         file.write(_LINE % _digest(file, file.seek(0, os.SEEK_END)).encode())
 
 
-def check(path: str | Path, *, foreign: bool = False) -> None:
-    """Refuse a file whose bytes do not fit its checksum; say on stderr, once for each file, where it has none.
+@contextlib.contextmanager
+def checked(path: str | Path) -> Iterator[None]:
+    """A block that reads a file, after `check`; then says on stderr, once for each file, where it has no checksum."""
+    has_checksum = check(path)
+    yield
+    if not has_checksum:
+        _say(str(path))
 
-    foreign: the file may be one of another program, so that nothing is said where it has none
-    """
+
+def check(path: str | Path) -> bool:
+    """Refuse a file whose bytes do not fit its checksum; return whether it has one."""
     with open(path, "rb") as file:
         size = file.seek(0, os.SEEK_END) - _LENGTH
         file.seek(max(0, size))
@@ -40,8 +48,7 @@ def check(path: str | Path, *, foreign: bool = False) -> None:
         if found and found[1].decode() != _digest(file, size):
             raise InputError(f"{path}: its contents do not fit its checksum, so it was damaged after it was written; take a copy "
                              "of it, or make it again.")
-    if not found and not foreign:
-        _say(str(path))
+    return found is not None
 
 
 @cache

@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 import softtact
-from softtact.checksums import SEALED, check, seal
+from softtact.checksums import SEALED, checked, seal
 from softtact.errors import InputError
 from softtact.inputs import check_input, check_limit, in_one_sentence
 from softtact.outputs import NO_ROOM, not_written, target_of, temporary_file
@@ -170,8 +170,7 @@ def read_dataset(path: str | Path) -> "xr.Dataset":
     import xarray
 
     check_input(path, "arrays")
-    check(path)
-    with in_one_sentence(path, "not a readable NetCDF file", _AGAIN):
+    with checked(path), in_one_sentence(path, "not a readable NetCDF file", _AGAIN):
         with h5py.File(path, "r") as file:
             check_limit(path, "arrays", _unpacked(file))
         return xarray.load_dataset(path, engine="h5netcdf")
@@ -188,7 +187,6 @@ def _unpacked(file):
 def read_arrays(path: str | Path) -> Iterator[np.lib.npyio.NpzFile]:
     """The arrays of an .npz file, open while a block reads them; a damaged file raises `InputError`."""
     check_input(path, "arrays")
-    check(path)
-    with in_one_sentence(path, "not a readable file of arrays", _AGAIN), np.load(path, allow_pickle=False) as data:
+    with checked(path), in_one_sentence(path, "not a readable file of arrays", _AGAIN), np.load(path, allow_pickle=False) as data:
         check_limit(path, "arrays", sum(one.file_size for one in data.zip.infolist()))
         yield data

@@ -123,7 +123,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
 def _read(path: Path) -> "meshio.Mesh":
     import meshio
 
-    check_mesh_file(path, foreign=True)
+    check_mesh_file(path)
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):     # meshio prints errors itself
             return meshio.read(path)
@@ -133,13 +133,13 @@ def _read(path: Path) -> "meshio.Mesh":
         raise InputError(f"{path}: not readable as a mesh of elements ({problem}); {known}.") from None
 
 
-def check_mesh_file(path: str | Path, *, foreign: bool = False) -> None:
+def check_mesh_file(path: str | Path) -> None:
     """Refuse a file of elements that is missing, too large (packed arrays as large as they unpack) or damaged since it was written.
 
-    foreign: it may be of another program, which writes no checksum
+    A file without a checksum passes without a word: other programs write such files, too.
     """
     check_input(path, "mesh", missing="there is no such mesh file.")
-    check(path, foreign=foreign)
+    check(path)
     if Path(path).suffix.lower() == ".vtu":
         check_limit(path, "mesh", _unpacked_bytes(Path(path).read_bytes()))
 

@@ -24,7 +24,7 @@ import torch
 from torch import nn
 
 import softtact
-from softtact.checksums import check
+from softtact.checksums import checked
 from softtact.errors import InputError
 from softtact.files import atomic_path
 from softtact.inputs import check_input, check_limit
@@ -162,11 +162,10 @@ def save(path: str | Path, stored: dict[str, Any]) -> None:
 def load(path: str | Path) -> dict[str, Any]:
     """Read a file of `save`. Raises InputError for a file with anything but tensors and plain values."""
     check_input(path, "arrays", missing="there is no such file; train the network first.")
-    check(path)
     try:
-        with zipfile.ZipFile(path) as parts:
+        with checked(path), zipfile.ZipFile(path) as parts:
             check_limit(path, "arrays", sum(one.file_size for one in parts.infolist()))
-        return torch.load(path, map_location="cpu", weights_only=True)
+            return torch.load(path, map_location="cpu", weights_only=True)
     except InputError:
         raise
     except Exception:  # torch passes on any error of its unpickler, with advice to load the file although it may run code

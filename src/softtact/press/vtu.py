@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softtact.checksums import checked
 from softtact.errors import InputError
 from softtact.fem.mesh_files import check_mesh_file, write_mesh
 from softtact.files import atomic_path
@@ -121,7 +122,7 @@ def read_vtu(path: str | Path) -> PressedMesh:
     from meshio import vtu
 
     check_mesh_file(path)
-    with in_one_sentence(path, "not readable as VTU", "write it again"):
+    with checked(path), in_one_sentence(path, "not readable as VTU", "write it again"):
         mesh = vtu.read(path)
     load_steps = sorted((int(match[2] or 0), float(match[1]), name)
                         for name in mesh.point_data if (match := _LOAD_STEP.fullmatch(name)))
