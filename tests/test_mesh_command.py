@@ -1,5 +1,7 @@
 """`softtact mesh`: a surface or another program's elements become a body; what cannot be used is refused before work."""
 
+import contextlib
+import io
 import json
 
 import meshio
@@ -19,19 +21,33 @@ def box(tmp_path):
     return tmp_path / "box.stl"
 
 
-def test_a_surface_becomes_a_mesh_with_named_faces_and_its_quality_is_told(box, tmp_path, capsys):
+@pytest.fixture(scope="module")
+def meshed(tmp_path_factory):
+    """(result, messages, folder) of a box that was meshed in that folder, where a file had the name that fTetWild writes."""
     pytest.importorskip("pytetwild")
-    out = tmp_path / "box.vtu"
-    status = main(["mesh", str(box), "--unit", "mm", "--size", "2", "--region", "gel", "--face", "bottom=z<-1.49", "--json",
-                   "--out", str(out)])
-    told = capsys.readouterr()
-    assert status == 0 and "elements and" in told.err      # what it costs is said first
-    result = json.loads(told.out)
+    folder, shown, told = tmp_path_factory.mktemp("meshed"), io.StringIO(), io.StringIO()
+    trimesh.creation.box((6, 4, 3)).export(folder / "box.stl")
+    (folder / "__tracked_surface.stl").write_text("of the user")
+    line = "mesh box.stl --unit mm --size 2 --region gel --face bottom=z<-1.49 --json --out box.vtu"
+    with contextlib.chdir(folder), contextlib.redirect_stdout(shown), contextlib.redirect_stderr(told):
+        assert main(line.split()) == 0
+    return json.loads(shown.getvalue()), told.getvalue(), folder
+
+
+def test_a_surface_becomes_a_mesh_with_named_faces_and_its_quality_is_told(meshed):
+    result, told, folder = meshed
+    assert "elements and" in told      # what it costs is said first
     assert result["volume_error"] == pytest.approx(0, abs=1e-3) and result["least_quality"] > 0.1
-    mesh = read_mesh_file(out)
+    mesh = read_mesh_file(folder / "box.vtu")
     assert mesh.regions == result["regions"] == ["gel"]
     assert len(mesh.faces["bottom"]["triangle6"]) == result["faces"]["bottom"]
     assert mesh.points[mesh.face_nodes("bottom")][:, 2].max() == pytest.approx(-1.5)
+
+
+def test_meshing_writes_nothing_else_into_the_working_folder(meshed):
+    _, _, folder = meshed
+    assert (folder / "__tracked_surface.stl").read_text() == "of the user"
+    assert {path.name for path in folder.iterdir()} == {"box.stl", "box.vtu", "__tracked_surface.stl"}
 
 
 def test_elements_of_another_program_become_a_body(tmp_path, capsys):

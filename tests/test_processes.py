@@ -105,6 +105,15 @@ def test_a_process_that_is_killed_is_a_sentence_with_the_remedy():
         list(map_in_processes(lambda item: os.kill(os.getpid(), signal.SIGKILL), range(4), workers=2))
 
 
+def test_where_no_process_can_be_started_the_remedy_is_told(monkeypatch):
+    def refused(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("_multiprocessing.SemLock", refused)
+    with pytest.raises(WorkerError, match=r"^No process can be started .*Read-only file system.*/dev/shm .*; mount it for writing"):
+        call_apart(abs, -1)
+
+
 def test_what_a_process_raises_is_raised_here():
     with pytest.raises(ZeroDivisionError):
         call_apart(lambda a, b: a / b, 1, 0)

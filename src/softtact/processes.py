@@ -81,10 +81,15 @@ def map_in_processes(function: Callable[[_Item], _Result], items: Sequence[_Item
     """function(item) of each item, in their order, in processes that end at once if the caller stops or ends.
 
     A forked process shares the arrays that `function` holds; where there is no fork, each process gets a copy.
-    Raises WorkerError if a process is killed, as Linux does where memory runs out.
+    Raises WorkerError if a process is killed, as Linux does where memory runs out, and where the system allows no processes.
     """
     context = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(function, os.getpid()))
+    try:
+        pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(function, os.getpid()))
+    except OSError as error:     # of the semaphores, which Linux keeps in /dev/shm
+        raise WorkerError(f"No process can be started for this work ({error.strerror or error}), most likely because /dev/shm is "
+                          "missing, full or not writable; mount it for writing, or run with --workers 1 where there is this "
+                          "option.") from None
     try:
         yield from pool.map(_work, items, chunksize=max(1, len(items) // (8 * workers)))
     except BrokenProcessPool:

@@ -1,5 +1,6 @@
 """A grasp obeys statics: both pads press with the wanted force, the object is at the commanded place, friction holds."""
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
@@ -103,3 +104,11 @@ def test_an_object_wider_than_the_gripper_opens_is_refused(block, coro):
     wide.apply_scale(4)
     with pytest.raises(InputError, match="is 96 mm wide along z, and the pads open to 80 mm; turn its mesh"):
         build_scene(wide, coro, load_scene())
+
+
+def test_a_warning_of_mujoco_goes_to_stderr_and_into_no_file(scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    data = mujoco.MjData(scene.model)
+    data.qvel[0] = 1e300
+    mujoco.mj_step(scene.model, data)
+    assert "MuJoCo: Nan, Inf or huge value in QVEL" in capsys.readouterr().err and list(tmp_path.iterdir()) == []

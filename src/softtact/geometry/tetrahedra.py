@@ -5,6 +5,7 @@ tetrahedra's outside within an envelope around the given surface. It takes the f
 repetition gives another mesh of the same quality. To repeat the same numbers, keep the mesh file.
 """
 
+import contextlib
 import math
 from typing import Any
 
@@ -13,6 +14,8 @@ import trimesh
 
 from softtact.errors import InputError, how_to_install
 from softtact.geometry.meshes import volume_of
+from softtact.outputs import temporary_folder
+from softtact.processes import call_apart
 
 ELEMENTS_PER_CUBE = 13     # in a cube of the element size: measured 10 to 30, least where the size is small against the body
 _CORNER_SHARE = 0.5        # of its quality that a tetrahedron may lose when one of its corners is moved onto the surface
@@ -68,11 +71,11 @@ def fill(surface: trimesh.Trimesh, *, size_mm: float, envelope_mm: float, thread
 
     size_mm: desired edge length;  envelope_mm: largest distance of the outside from the surface before corners are moved onto it
     """
-    _, pytetwild = _programs()
+    _programs()     # refuses here, not in the other process, where they are missing
     diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-    points, tetrahedra = pytetwild.tetrahedralize(
-        np.asarray(surface.vertices, dtype=float), np.asarray(surface.faces, dtype=np.int32), edge_length_abs=size_mm,
-        epsilon=envelope_mm / diagonal, num_threads=threads, vtk_ordering=True)
+    options = {"edge_length_abs": size_mm, "epsilon": envelope_mm / diagonal, "num_threads": threads, "vtk_ordering": True}
+    points, tetrahedra = call_apart(_filled, np.asarray(surface.vertices, dtype=float), np.asarray(surface.faces, dtype=np.int32),
+                                    options)
     tetrahedra = np.asarray(tetrahedra, dtype=np.int64)
     if not len(tetrahedra):
         raise InputError(f"Elements of {size_mm:g} mm with an envelope of {envelope_mm:g} mm do not fill the body; give less.")
@@ -86,6 +89,12 @@ def fill(surface: trimesh.Trimesh, *, size_mm: float, envelope_mm: float, thread
         here = np.linalg.norm(near - points[outer], axis=1) <= envelope_mm
         points = _moved(points, tetrahedra, outer[here], near[here])
     return points, tetrahedra
+
+
+def _filled(points, triangles, options):
+    """What fTetWild makes, in a folder of its own: it writes its surface into the working folder, over a file of that name."""
+    with temporary_folder() as folder, contextlib.chdir(folder):
+        return _programs()[1].tetrahedralize(points, triangles, **options)
 
 
 def _moved(points, tetrahedra, corners, places):

@@ -14,6 +14,7 @@ def main(folder: str | Path) -> None:
     import mujoco
 
     folder = Path(folder)
+    mujoco.set_mju_user_warning(lambda text: print(text, file=sys.stderr))     # else it writes MUJOCO_LOG.TXT
     model = mujoco.MjModel.from_binary_path(str(folder / "scene.mjb"))
     data = mujoco.MjData(model)
     with np.load(folder / "states.npz", allow_pickle=False) as states:

@@ -19,6 +19,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
+from softtact.progress import announce
 from softtact.robot.arm import HOME_RAD, JOINTS, add_arm
 from softtact.robot.events import FINGERS
 from softtact.robot.settings import SceneSettings
@@ -81,6 +82,7 @@ def build_scene(mesh: trimesh.Trimesh, spec: "AnySpec", settings: SceneSettings,
     mass_kg: of the object; by default its volume times `density_kg_m3`
     Raises InputError where the object is wider than the gripper opens, or a user's MJCF lacks a name.
     """
+    mujoco.set_mju_user_warning(_warn)     # without it MuJoCo writes MUJOCO_LOG.TXT into the working folder
     robot = _user_robot(settings) if settings.mjcf else _ur10_with_gripper(settings, spec)
     width = float(np.ptp(mesh.bounds[:, 2]))
     if not settings.mjcf and width >= settings.stroke_mm - 2 * spec.thickness_mm:
@@ -89,6 +91,10 @@ def build_scene(mesh: trimesh.Trimesh, spec: "AnySpec", settings: SceneSettings,
     mass = mass_kg if mass_kg is not None else abs(mesh.volume) * MM**3 * settings.density_kg_m3
     _add_object(robot, mesh, settings, placement, mass)
     return Scene(model=robot.compile(), settings=settings, mass_kg=float(mass), width_mm=width)
+
+
+def _warn(text):
+    announce(f"MuJoCo: {text}")
 
 
 def to_mjcf(spec: "AnySpec", settings: SceneSettings) -> str:
