@@ -19,6 +19,7 @@ from softtact.inputs import check_input, check_limit, in_one_sentence
 from softtact.outputs import NO_ROOM, not_written, target_of, temporary_file
 
 if TYPE_CHECKING:
+    import h5py
     import pandas as pd
     import xarray as xr
 
@@ -28,8 +29,10 @@ PROVENANCE = ("softtact_version", "config_digest", "seed")     # attributes of e
 
 
 @contextlib.contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
+def atomic_path(path: str | Path, *, durable: bool = False) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` if the block succeeds, delete it otherwise.
+
+    durable: wait until the file is on the disk, so that not even a power failure loses it
 
     A binary file gets its checksum. A link stays, and its target is written. A full disk, or a folder that cannot be written to,
     becomes an `OutputError`.
@@ -45,6 +48,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             yield temporary
             if suffix.lower() in SEALED:
                 seal(temporary)
+            if durable:
+                wait_for_disk(temporary)
         except OSError as error:
             if error.errno in NO_ROOM:
                 raise not_written(path, error) from None
@@ -53,8 +58,59 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)  # a temporary file is private; results are to be shared
         os.replace(temporary, target)
+        if durable:
+            wait_for_disk(target.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def wait_for_disk(path: str | Path) -> None:
+    """Wait until a file's content, or the names in a folder, are on the disk, which may be full only then."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextlib.contextmanager
+def new_hdf5(path: str | Path) -> Iterator["h5py.File"]:
+    """A new HDF5 file. A write that fails raises an OSError at the end of the block.
+
+    HDF5 itself is not told of it: it would try again when the file is closed and when the process ends, and then crash it.
+    """
+    import h5py
+
+    with _Unfailing(path, "w+") as raw:
+        try:
+            with h5py.File(raw, "w") as file:
+                yield file
+        finally:
+            if raw.error is not None:
+                raise raw.error
+
+
+class _Unfailing(io.FileIO):
+    """A file that seems to take all that is written; `error` is that of the first write that failed."""
+
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        try:
+            while len(rest) and self.error is None:
+                rest = rest[super().write(rest):]
+        except OSError as error:
+            self.error = error
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return self.tell() if size is None else size
 
 
 class _OnceLoader(yaml.SafeLoader):

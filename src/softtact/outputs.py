@@ -5,6 +5,7 @@ A temporary file or folder has the process in its name. The next one in the same
 
 import contextlib
 import errno
+import fcntl
 import hashlib
 import os
 import platform
@@ -164,3 +165,24 @@ def _has_ended(process):
     except OSError:     # it runs for another user
         return False
     return False
+
+
+@contextlib.contextmanager
+def held(folder: str | Path, *, busy: str = "another run of this study is in progress") -> Iterator[None]:
+    """Lock a folder, made where it is missing, against a second run while the block runs.
+
+    busy: what its message says of the other run
+    The system releases this lock whenever its holder dies; Snakemake's lock would remain.
+    """
+    file = Path(folder, ".running")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        lock = file.open("a")     # does not change the file's modification time
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written to ({error.strerror}); correct that.") from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{folder}: {busy}; wait for its end.") from None
+        yield

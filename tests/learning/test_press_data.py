@@ -1,5 +1,11 @@
 """Data sets of random presses: the same by the same seed, whole after an interruption, in forms that other programs read."""
 
+import multiprocessing
+import os
+import resource
+import signal
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -8,11 +14,13 @@ import trimesh
 import xarray
 
 import softtact
+from softtact import files
 from softtact.cli import main
-from softtact.errors import InputError
+from softtact.errors import InputError, OutputError
 from softtact.geometry.pose import Pose
-from softtact.learning import press_data
+from softtact.learning import press_blocks, press_data
 from softtact.learning.press_data import PressPlan, behind, presses_left, write_press_data
+from softtact.outputs import held
 
 
 @pytest.fixture(scope="module")
@@ -49,33 +57,124 @@ def test_a_sample_is_the_press_that_its_pose_and_force_name(whole, sensor, meshe
     assert np.array_equal(found["tactile_map"][3, :, 0], np.round(again.tactile_map))
 
 
-def test_an_interrupted_data_set_goes_on_and_ends_as_if_it_had_not_been(whole, sensor, meshes, tmp_path, monkeypatch):
-    monkeypatch.setattr(press_data, "_BLOCK", 2)
+# --- data sets that are interrupted, and faults of the disk ---
+
+
+@pytest.fixture
+def ours(sensor, meshes, monkeypatch):
+    """Four presses in blocks of two."""
+    monkeypatch.setattr(press_blocks, "BLOCK", 2)
+    return plan(sensor, meshes)
+
+
+def stopped(path, plan, monkeypatch, stop):
+    """Write a data set in which stop() is called before the second block."""
     pressed = press_data._pressed
+    with monkeypatch.context() as patch:
+        patch.setattr(press_data, "_pressed", lambda plan, numbers, workers:
+                      stop() if numbers[0] else pressed(plan, numbers, workers))
+        write_press_data(path, plan, workers=1, label="")
 
-    def stop_at_the_second(plan, numbers, workers):
-        if numbers[0] >= 2:
-            raise KeyboardInterrupt
-        return pressed(plan, numbers, workers)
 
-    monkeypatch.setattr(press_data, "_pressed", stop_at_the_second)
-    path, ours = tmp_path / "stopped.h5", plan(sensor, meshes)
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def assert_goes_on(path, plan, whole, *, left):
+    """A data set of which some presses are left becomes that which nothing disturbed, byte for byte, and nothing else stays."""
+    assert not path.exists() and presses_left(path, plan) == left
+    assert write_press_data(path, plan, workers=1, label="") == 0
+    assert path.read_bytes() == whole.read_bytes() and [one.name for one in path.parent.iterdir()] == [path.name]
+
+
+def test_an_interrupted_data_set_goes_on_and_ends_as_if_it_had_not_been(whole, ours, tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
+        stopped(tmp_path / "stopped.h5", ours, monkeypatch, interrupt)
+    assert_goes_on(tmp_path / "stopped.h5", ours, whole, left=2)
+
+
+def test_a_killed_data_set_goes_on_and_ends_as_if_it_had_not_been(whole, ours, tmp_path, monkeypatch):
+    path = tmp_path / "killed.h5"
+    run = multiprocessing.get_context("fork").Process(
+        target=lambda: stopped(path, ours, monkeypatch, lambda: os.kill(os.getpid(), signal.SIGKILL)))
+    run.start()
+    run.join()
+    assert run.exitcode == -signal.SIGKILL
+    assert_goes_on(path, ours, whole, left=2)
+
+
+@pytest.fixture
+def room():
+    """Sets the most bytes that a file may have: a file that grows beyond them meets the error of a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def size_of_a_block(tmp_path):
+    return next((tmp_path / "full.h5.part").glob("*.npz")).stat().st_size
+
+
+@pytest.mark.parametrize("size", [1000, "a block"])
+def test_a_full_disk_is_a_sentence_and_finished_blocks_stay(size, whole, ours, tmp_path, monkeypatch, room):
+    """Full at the first block, or where the blocks are put together."""
+    path = tmp_path / "full.h5"
+    if size == "a block":
+        with pytest.raises(KeyboardInterrupt):
+            stopped(path, ours, monkeypatch, interrupt)
+        size = size_of_a_block(tmp_path) + 1000
+    room(size)
+    with pytest.raises(OutputError, match="cannot be written .File too large.; make room on the disk"):
         write_press_data(path, ours, workers=1, label="")
-    assert not path.exists() and presses_left(path, ours) == 2
-    monkeypatch.setattr(press_data, "_pressed", pressed)
-    write_press_data(path, ours, workers=1, label="")
-    assert all(np.array_equal(values, arrays(path)[name]) for name, values in arrays(whole).items())
-    assert [one.name for one in tmp_path.iterdir()] == ["stopped.h5"]
+    room(resource.RLIM_INFINITY)
+    assert_goes_on(path, ours, whole, left=4 if size == 1000 else 0)
 
 
-def test_another_seed_draws_other_places_and_another_begun_data_set_is_refused(sensor, meshes, tmp_path):
+def test_what_the_disk_did_not_keep_is_found_before_the_data_set_has_its_name(whole, ours, tmp_path, monkeypatch):
+    path = tmp_path / "lost.h5"
+    with monkeypatch.context() as patch:
+        write = files._Unfailing.write
+        patch.setattr(files._Unfailing, "write", lambda file, data: write(file, bytes(len(memoryview(data).cast("B")))
+                                                                          if memoryview(data).nbytes > 10_000 else data))
+        with pytest.raises(OutputError, match="lost.h5.part/whole.h5: what was written is not what is read back; check the disk"):
+            write_press_data(path, ours, workers=1, label="")
+    assert_goes_on(path, ours, whole, left=0)
+
+
+def test_a_damaged_block_is_named_and_pressed_again(whole, ours, tmp_path, monkeypatch, capsys):
+    path = tmp_path / "flipped.h5"
+    with pytest.raises(KeyboardInterrupt):
+        stopped(path, ours, monkeypatch, interrupt)
+    block = tmp_path / "flipped.h5.part/00000000.npz"
+    content = bytearray(block.read_bytes())
+    content[len(content) // 2] ^= 1
+    block.write_bytes(content)
+    assert_goes_on(path, ours, whole, left=4)
+    assert "00000000.npz: this block is damaged; presses 0 to 1 are pressed again." in capsys.readouterr().err
+
+
+def test_a_data_set_that_is_being_written_is_told_from_a_damaged_one(ours, tmp_path):
+    with held(tmp_path / "a.h5.part"), pytest.raises(InputError, match="a.h5.part: another run writes this data set; wait"):
+        write_press_data(tmp_path / "a.h5", ours, workers=1, label="")
+
+
+def test_no_refusal_advises_to_delete_what_holds_finished_presses(whole, ours, tmp_path, monkeypatch):
+    path = tmp_path / "a.h5"
+    with pytest.raises(InputError, match="finished data set; give another name"):
+        write_press_data(whole, ours, workers=1, label="")
+    with pytest.raises(KeyboardInterrupt):
+        stopped(path, ours, monkeypatch, interrupt)
+    for act in (presses_left, write_press_data):
+        with pytest.raises(InputError, match="unfinished data set of other objects or settings; finish it with those, move"):
+            act(path, replace(ours, seed=4))
+    (tmp_path / "old.h5.part").write_bytes(b"of an earlier version")
+    with pytest.raises(InputError, match="of an earlier version; give another name, or finish it with that"):
+        write_press_data(tmp_path / "old.h5", ours, workers=1, label="")
+
+
+def test_another_seed_draws_other_places_and_more_presses_begin_with_the_same(sensor, meshes):
     assert not np.array_equal(plan(sensor, meshes).poses, plan(sensor, meshes, seed=4).poses)
     assert np.array_equal(plan(sensor, meshes).poses, plan(sensor, meshes, presses=9).poses[:4])
-    with press_data._opened(tmp_path / "a.h5.part", "a") as file:
-        press_data._begin(file, plan(sensor, meshes, seed=4))
-    with pytest.raises(InputError, match="there is an unfinished data set of other objects or settings; delete it, or give"):
-        write_press_data(tmp_path / "a.h5", plan(sensor, meshes), workers=1, label="")
 
 
 def test_from_behind_the_upper_side_touches_and_x_turns_round(meshes):

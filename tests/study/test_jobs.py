@@ -4,9 +4,10 @@ import pytest
 import yaml
 
 from softtact.errors import InputError
+from softtact.outputs import held
 from softtact.studies import jobs as module
 from softtact.studies.code_closure import code_closure, code_digest
-from softtact.studies.jobs import Job, held, run_jobs, stage_source, stages_of
+from softtact.studies.jobs import Job, run_jobs, stage_source, stages_of
 from softtact.studies.registry import KINDS, open_study
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.outputs import held
 from softtact.studies.code_closure import code_closure
 from softtact.studies.cost import cost_lines, origin_of, read_costs
-from softtact.studies.jobs import held, stage_source, stages_of
+from softtact.studies.jobs import stage_source, stages_of
 from softtact.studies.registry import checked_study
 
 try:

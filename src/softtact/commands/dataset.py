@@ -38,7 +38,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--workers", type=int, metavar="N", help="processes (default: one for each core)")
     command.add_argument("--cost", action="store_true", help="say what is left and how long it takes, and do nothing")
     command.add_argument("--out", type=Path, required=True, metavar="FILE",
-                         help="the data set; while it grows it is FILE.part, from which the same command goes on")
+                         help="the data set; until it is whole, finished presses are in the folder FILE.part, from which the same "
+                              "command continues")
 
 
 def _dataset(options):

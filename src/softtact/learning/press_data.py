@@ -1,4 +1,7 @@
-"""Data sets of random presses, written in blocks so that an interrupted run can continue: HDF5, NetCDF, or LeRobot's key names.
+"""Data sets of random presses: HDF5, NetCDF, or LeRobot's key names.
+
+A run that is killed, or stopped by a full disk, keeps its finished blocks of presses (`press_blocks`), from which the same call
+continues. Once all blocks are there, the data set is written, read back, compared with them, and only then gets its name.
 
 Press n uses object n modulo the number of objects. Its place and angle are drawn from the seed, the object's name and n only. All
 presses have the same forces. With two fingers the object is also pressed from its opposite side, as in a grip.
@@ -12,6 +15,7 @@ lerobot   a row for each press and force, in HDF5, with the key names of LeRobot
 """
 
 import os
+import shutil
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,23 +30,25 @@ from scipy.spatial.transform import Rotation
 
 import softtact
 from softtact.errors import InputError, OutputError, SofttactError
-from softtact.files import atomic_path, digest, write_dataset
+from softtact.files import atomic_path, digest, new_hdf5, wait_for_disk, write_dataset
 from softtact.geometry.pose import Pose, draw_poses
+from softtact.learning.press_blocks import BLOCK, PressBlocks
+from softtact.outputs import held, target_of
 from softtact.progress import progress
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 _BEHIND = Rotation.from_euler("y", 180, degrees=True)
-_BLOCK = 32     # presses written together
-TO_DO, DONE, FAILED = 0, 1, 2
+DONE, FAILED = 1, 2     # status of a press
 FORMATS = {"hdf5": (".h5", ".hdf5"), "netcdf": (".nc",), "lerobot": (".h5", ".hdf5")}
 FINGERS = ("left", "right")
 _FPS = 10.0     # of the timestamps: 0.1 s between two forces, assumed because a press is quasi-static
-_DIMENSIONS = {"deformation_map_mm": ("press", "force", "finger", "y", "x"),
-               "tactile_map": ("press", "force", "finger", "row", "column"), "indentation_mm": ("press", "force", "finger"),
-               "within_validity": ("press", "force", "finger"), "status": ("press",), "force_n": ("force",),
-               "pose": ("press", "six"), "object": ("press",)}
+_OF_A_BLOCK = {"deformation_map_mm": ("mm", "force", "finger", "y", "x"),
+               "tactile_map": ("counts", "force", "finger", "row", "column"), "indentation_mm": ("mm", "force", "finger"),
+               "within_validity": ("1", "force", "finger"), "status": ("1",), "pose": ("mm, degrees", "six"),
+               "object": ("number in objects",)}     # unit and dimensions after the press
+_OF_A_FRAME = {"observation.force": "N", "observation.state": "mm, degrees", "timestamp": "s"}     # units
 
 
 @dataclass(frozen=True)
@@ -92,33 +98,26 @@ def write_press_data(path: str | Path, plan: PressPlan, *, form: str = "hdf5", w
                      label: str = "presses") -> int:
     """Write a data set, or continue an unfinished one; return the number of failed presses, which hold zeros and a status.
 
-    form: hdf5, netcdf or lerobot. The unfinished file lies beside `path` with the ending `.part`
-    Raises InputError for an unknown form or ending, or if another data set exists there.
+    form: hdf5, netcdf or lerobot. Finished blocks are in a folder beside `path` with the ending `.part` until the end.
+    Raises InputError for an unknown form or ending, if another data set exists there, or if another run writes it; OutputError if
+    there is no room on the disk.
     """
-    path = Path(path)
-    check_name(path, form)
-    if path.exists():
-        raise InputError(f"{path}: there is already a finished data set; delete it, or give another name.")
-    part = _part(path)
-    with _opened(part, "a") as file:
-        if "settings" in file.attrs:
-            _refuse_other(part, file, plan)
-        else:
-            _begin(file, plan)
-        _fill(file, plan, workers, label)
-        failed = int((file["status"][:] == FAILED).sum())
-    finish(part, path, form)
+    check_name(Path(path), form)
+    path, part = target_of(path), _part(path)
+    _refuse_finished(path)
+    with held(part, busy="another run writes this data set"):
+        _refuse_finished(path)     # by a run that has ended since
+        blocks = PressBlocks(part, plan.settings, plan.presses)
+        for numbers in progress(blocks.missing(), label=f"{label}, in blocks of {BLOCK}" if label else ""):
+            blocks.write(numbers, _arrays(plan, _pressed(plan, numbers, workers)))
+        failed = _finish(part, path, form, plan, blocks)
+        shutil.rmtree(part)
     return failed
 
 
 def presses_left(path: str | Path, plan: PressPlan) -> int:
     """Number of presses that a data set still needs."""
-    part = _part(Path(path))
-    if not part.exists():
-        return plan.presses
-    with _opened(part, "r") as file:
-        _refuse_other(part, file, plan)
-        return int((file["status"][:] == TO_DO).sum())
+    return sum(map(len, PressBlocks(_part(path), plan.settings, plan.presses).missing()))
 
 
 def check_name(path: Path, form: str) -> None:
@@ -129,51 +128,18 @@ def check_name(path: Path, form: str) -> None:
         raise InputError(f"{path}: the format {form} is written as {' or '.join(FORMATS[form])}; give a name with such an ending.")
 
 
+def _refuse_finished(path):
+    if path.exists():
+        raise InputError(f"{path}: there is already a finished data set; give another name.")
+
+
 def _part(path):
-    return path.with_name(f"{path.name}.part")
-
-
-def _opened(path, mode):
-    try:
-        return h5py.File(path, mode, libver="latest")
-    except OSError as error:
-        reason = " ".join(str(error).split())[:120]
-        if mode == "a" and not path.exists():
-            raise OutputError(f"{path}: cannot be written ({reason}); make its folder, or room on the disk.") from None
-        raise InputError(f"{path}: not readable as an unfinished data set ({reason}); delete it and start again.") from None
-
-
-def _refuse_other(part, file, plan):
-    if file.attrs.get("settings") != plan.settings:
-        raise InputError(f"{part}: there is an unfinished data set of other objects or settings; delete it, or give another name.")
-
-
-def _begin(file, plan):
-    """Empty arrays of their final size."""
-    spec, n, f, s = plan.sensor.spec, plan.presses, plan.fingers, len(plan.forces_n)
-    taxels = spec.need_taxels("a data set of presses")
-    shapes = {"deformation_map_mm": ((n, s, f, *spec.map_shape), "f4", "mm"),
-              "tactile_map": ((n, s, f, taxels.rows, taxels.columns), "u2", "counts"),
-              "indentation_mm": ((n, s, f), "f4", "mm"), "within_validity": ((n, s, f), "i1", "1"), "status": ((n,), "i1", "1")}
-    for name, (shape, kind, units) in shapes.items():
-        file.create_dataset(name, shape, kind, chunks=(min(n, _BLOCK), *shape[1:])).attrs["units"] = units
-    file.create_dataset("force_n", data=np.asarray(plan.forces_n, dtype=float)).attrs["units"] = "N"
-    file.create_dataset("pose", data=plan.poses).attrs["units"] = "mm, degrees"
-    file.create_dataset("object", data=np.arange(n, dtype="i4") % len(plan.meshes)).attrs["units"] = "number in objects"
-    facts = {"settings": plan.settings, "seed": plan.seed, "model": plan.model, "sensor": spec.name,
-             "objects": ",".join(plan.meshes), "source": "simulation, ideal readout", "softtact_version": softtact.__version__}
-    for name, value in facts.items():
-        file.attrs[name] = value
-
-
-def _fill(file, plan, workers, label):
-    left = np.flatnonzero(file["status"][:] == TO_DO)
-    blocks = [left[first:first + _BLOCK] for first in range(0, len(left), _BLOCK)]
-    for block in progress(blocks, label=f"{label}, in blocks of {_BLOCK}"):
-        results = _pressed(plan, block, workers)
-        for number, of_fingers in zip(block, results, strict=True):
-            _keep(file, int(number), of_fingers)
-        file.flush()
+    path = target_of(path)
+    part = path.with_name(f"{path.name}.part")
+    if part.is_file():
+        raise InputError(f"{part}: this is an unfinished data set of an earlier version; give another name, or finish it "
+                         "with that.")
+    return part
 
 
 def _pressed(plan, numbers, workers):
@@ -188,55 +154,105 @@ def _pressed(plan, numbers, workers):
     return [results[first:first + plan.fingers] for first in range(0, len(results), plan.fingers)]
 
 
-def _keep(file: Any, number: int, results: Sequence[Any]) -> None:
-    """Write the results of one press for each finger; a failed one keeps zeros."""
-    if any(isinstance(one, SofttactError) for one in results):
-        file["status"][number] = FAILED
-        return
-    for name in ("deformation_map_mm", "indentation_mm", "within_validity"):
-        file[name][number] = np.stack([getattr(one, name) for one in results], axis=1)
-    file["tactile_map"][number] = np.round(np.stack([one.tactile_map for one in results], axis=1)).astype(np.uint16)
-    file["status"][number] = DONE
+def _arrays(plan: PressPlan, results: Sequence[Sequence[Any]]) -> dict[str, np.ndarray]:
+    """The arrays of a block from the results of each press for each finger; a failed press has zeros."""
+    count, spec = (len(results), len(plan.forces_n), plan.fingers), plan.sensor.spec
+    taxels = spec.need_taxels("a data set of presses")
+    arrays = {"deformation_map_mm": np.zeros((*count, *spec.map_shape), np.float32),
+              "tactile_map": np.zeros((*count, taxels.rows, taxels.columns), np.uint16),
+              "indentation_mm": np.zeros(count, np.float32), "within_validity": np.zeros(count, np.int8),
+              "status": np.full(len(results), FAILED, np.int8)}
+    for number, of_fingers in enumerate(results):
+        if any(isinstance(one, SofttactError) for one in of_fingers):
+            continue
+        for name in ("deformation_map_mm", "indentation_mm", "within_validity"):
+            arrays[name][number] = np.stack([getattr(one, name) for one in of_fingers], axis=1)
+        arrays["tactile_map"][number] = np.round(np.stack([one.tactile_map for one in of_fingers], axis=1))
+        arrays["status"][number] = DONE
+    return arrays
 
 
-def finish(part: Path, path: Path, form: str) -> None:
-    """Convert a complete file to the data set of a form, and delete the file."""
-    if form == "hdf5":
-        os.replace(part, path)
-        return
-    with h5py.File(part, "r") as file:
-        {"netcdf": _as_netcdf, "lerobot": _as_lerobot}[form](file, path)
-    part.unlink()
+def _finish(part, path, form, plan, blocks):
+    """Write the data set of a form from all blocks, check it, and give it its name; return the number of failed presses."""
+    failed = sum(int((arrays["status"] == FAILED).sum()) for _, arrays in blocks)
+    rows = (plan.presses - failed) * len(plan.forces_n) if form == "lerobot" else plan.presses
+    whole = part / f"whole{path.suffix}"
+    (_write_netcdf if form == "netcdf" else _write_hdf5)(whole, rows, form, plan, blocks)
+    _refuse_other_rows(whole, rows, form, plan, blocks)
+    os.replace(whole, path)
+    wait_for_disk(path.parent)
+    return failed
 
 
-def _as_netcdf(file, path):
+def _refuse_other_rows(whole, rows, form, plan, blocks):
+    """Read a written file back and compare it with all blocks."""
+    try:
+        with h5py.File(whole, "r") as file:
+            same = all(len(file[name]) == rows and file[name][part].tobytes() == values.tobytes()
+                       for part, arrays in _rows(form, plan, blocks) for name, values in arrays.items())
+    except (OSError, KeyError):
+        same = False
+    if not same:
+        raise OutputError(f"{whole}: what was written is not what is read back; check the disk, and run again: finished presses "
+                          "are kept.")
+
+
+def _rows(form, plan, blocks):
+    """(slice of the rows, {name: their values}) of each block in a form."""
+    first, of_block = 0, _as_frames if form == "lerobot" else _as_presses
+    for numbers, arrays in blocks:
+        rows = of_block(plan, numbers, arrays, first)
+        last = first + len(next(iter(rows.values())))
+        yield slice(first, last), rows
+        first = last
+
+
+def _as_presses(plan, numbers, arrays, first):
+    return arrays | {"pose": plan.poses[numbers], "object": numbers.astype(np.int32) % len(plan.meshes)}
+
+
+def _as_frames(plan, numbers, arrays, first):
+    """Rows of the successful presses, one for each force."""
+    done = numbers[arrays["status"] == DONE]
+    taxels, forces = arrays["tactile_map"][arrays["status"] == DONE], len(plan.forces_n)
+    index = first + np.arange(len(done) * forces)
+    frame = index % forces
+    rows = {f"observation.tactile.{name}": taxels[:, :, finger].reshape(len(index), *taxels.shape[3:])
+            for finger, name in enumerate(FINGERS[:plan.fingers])}
+    return rows | {"observation.force": np.tile(np.asarray(plan.forces_n, np.float32), len(done))[:, None],
+                   "observation.state": np.repeat(plan.poses[done], forces, axis=0).astype(np.float32),
+                   "episode_index": index // forces, "frame_index": frame, "timestamp": (frame / _FPS).astype(np.float32),
+                   "index": index, "task_index": np.repeat(done % len(plan.meshes), forces).astype(np.int64)}
+
+
+def _facts(plan):
+    return {"settings": plan.settings, "seed": plan.seed, "model": plan.model, "sensor": plan.sensor.spec.name,
+            "objects": ",".join(plan.meshes), "source": "simulation, ideal readout", "softtact_version": softtact.__version__}
+
+
+def _unit(name):
+    return _OF_A_BLOCK[name][0] if name in _OF_A_BLOCK else "counts" if "tactile" in name else _OF_A_FRAME.get(name, "1")
+
+
+def _write_hdf5(path, rows, form, plan, blocks):
+    with atomic_path(path, durable=True) as temporary, new_hdf5(temporary) as file:
+        for part, arrays in _rows(form, plan, blocks):
+            for name, values in arrays.items():
+                if name not in file:
+                    file.create_dataset(name, (rows, *values.shape[1:]), values.dtype).attrs["units"] = _unit(name)
+                file[name][part] = values
+        if form == "hdf5":
+            file.create_dataset("force_n", data=np.asarray(plan.forces_n, dtype=float)).attrs["units"] = "N"
+        file.attrs.update(_facts(plan) | ({"fps": _FPS} if form == "lerobot" else {}))
+
+
+def _write_netcdf(path, rows, form, plan, blocks):
     import xarray
 
-    arrays = {name: (dims, file[name][:], {"units": file[name].attrs["units"]}) for name, dims in _DIMENSIONS.items()}
-    facts = {name: value.item() if isinstance(value, np.generic) else value for name, value in file.attrs.items()}
-    fingers = np.array(FINGERS[:file["tactile_map"].shape[2]], dtype=object)
-    write_dataset(path, xarray.Dataset(arrays, coords={"finger": fingers}, attrs=facts), seed=facts["seed"],
-                  settings=facts["settings"])
-
-
-def _as_lerobot(file, path):
-    """Rows of the successful presses."""
-    done = np.flatnonzero(file["status"][:] == 1)
-    presses, forces = len(done), len(file["force_n"])
-    taxels = file["tactile_map"][:][done]
-    frame = np.tile(np.arange(forces), presses)
-    columns = {f"observation.tactile.{name}": taxels[:, :, finger].reshape(presses * forces, *taxels.shape[3:])
-               for finger, name in enumerate(FINGERS[:taxels.shape[2]])}
-    columns |= {"observation.force": np.tile(file["force_n"][:], presses).astype(np.float32)[:, None],
-                "observation.state": np.repeat(file["pose"][:][done], forces, axis=0).astype(np.float32),
-                "episode_index": np.repeat(np.arange(presses), forces), "frame_index": frame,
-                "timestamp": (frame / _FPS).astype(np.float32), "index": np.arange(presses * forces),
-                "task_index": np.repeat(file["object"][:][done], forces).astype(np.int64)}
-    units = {"observation.force": "N", "observation.state": "mm, degrees", "timestamp": "s"}
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as out:
-        for name, values in columns.items():
-            out.create_dataset(name, data=values)
-            out[name].attrs["units"] = "counts" if "tactile" in name else units.get(name, "1")
-        for name, value in file.attrs.items():
-            out.attrs[name] = value
-        out.attrs["fps"] = _FPS
+    parts = [arrays for _, arrays in _rows(form, plan, blocks)]
+    arrays = {name: (("press", *dims), np.concatenate([part[name] for part in parts]), {"units": units})
+              for name, (units, *dims) in _OF_A_BLOCK.items()}
+    arrays["force_n"] = (("force",), np.asarray(plan.forces_n, dtype=float), {"units": "N"})
+    fingers = np.array(FINGERS[:plan.fingers], dtype=object)
+    write_dataset(path, xarray.Dataset(arrays, coords={"finger": fingers}, attrs=_facts(plan)), seed=plan.seed,
+                  settings=plan.settings)

@@ -4,13 +4,11 @@ A stage is `softtact.studies.KIND.stages.NAME` with a function `run(*, inputs, o
 a module in that package (or of the module `stages` itself).
 """
 
-import contextlib
-import fcntl
 import importlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -19,7 +17,7 @@ from typing import Any
 import softtact
 from softtact.errors import InputError
 from softtact.files import read_json, write_json
-from softtact.outputs import refuse_overwriting
+from softtact.outputs import held, refuse_overwriting
 from softtact.progress import announce
 from softtact.studies.code_closure import code_digest
 
@@ -171,23 +169,3 @@ def _job_digest(kind, job):
                 raise InputError(f"{path}: there is no such file, which {job.label} reads.")
             found.update(sha256(Path(path).read_bytes()).digest())
     return found.hexdigest()
-
-
-@contextlib.contextmanager
-def held(folder: str | Path) -> Iterator[None]:
-    """Lock a study's folder against a second run while the block runs.
-
-    The system releases this lock whenever its holder dies; Snakemake's lock would remain.
-    """
-    file = Path(folder, ".running")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        lock = file.open("a")     # does not change the file's modification time
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written to ({error.strerror}); correct that.") from None
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{folder}: another run of this study is in progress; wait for its end.") from None
-        yield
