@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from softtact.imaging.depth_image import DepthCamera
+from softtact.imaging.depth_image import DepthCamera, MovedObject
 from softtact.imaging.pinhole import Pinhole
+from softtact.press.objects import PlacedObject
 
 PINHOLE = Pinhole(64, 64, 0.25, 35.0)      # 16 mm
 X = (np.arange(64) - 31.5) * 0.25          # of the pixels on the surface at rest
@@ -62,3 +63,18 @@ def test_an_inner_wall_is_seen_from_the_side():
     wall = (u > 4.0 / 35 * 1.006) & (u < 4.0 / 33 * 0.994)
     assert wall.sum() > 2
     assert depth[wall] == pytest.approx(35 - 4.0 / u[wall], abs=0.25)      # half a pixel of 0.05 mm at this steep ray
+
+
+def test_an_object_of_the_solid_model_is_seen_where_it_moves_and_turns():
+    """Turned about the vertical it is that of the elastic model; tilted by 5 degrees its face is a plane of that slope."""
+    box = _box(6.0)
+    turn = trimesh.transformations.rotation_matrix(np.radians(20), (0, 0, 1))[:3, :3]
+    placed = PlacedObject(box.vertices, box.faces, np.array([[0.5, 0.0, -1.0]]), turn[None], np.array([0.0, 0.0, 2.5]))
+    moved = MovedObject(box, 0.0, np.array([[0.5, 0.0]]), np.array([1.0]), np.array([20.0]))
+    assert np.abs(placed.depths_mm(PINHOLE, deepest_mm=3.0) - moved.depths_mm(PINHOLE, deepest_mm=3.0)).max() < 1e-3
+
+    tilt = trimesh.transformations.rotation_matrix(np.radians(5), (0, 1, 0))[:3, :3]
+    depth = PlacedObject(box.vertices, box.faces, np.array([[0.0, 0.0, -1.0]]), tilt[None],
+                         np.zeros(3)).depths_mm(PINHOLE, deepest_mm=3.0)[0, 31]
+    x = X * (35 - depth) / 35
+    assert np.polyfit(x[22:42], depth[22:42], 1) == pytest.approx([np.tan(np.radians(5)), 1.0], abs=5e-3)

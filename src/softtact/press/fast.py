@@ -274,8 +274,7 @@ def _of_motion(sensor, moved, seconds, placed, motion):
     unknown, spec = np.full(len(moved.depth_mm), np.nan), sensor.spec
     touch = HeightField(placed).first_touch_mm(spec.map_x_mm, spec.map_y_mm)
     followed = MovedObject(placed, touch, motion.aside_mm[:len(unknown)], moved.depth_mm, np.zeros(len(unknown)))
-    plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, moved.displacement_mm, moved.traction_mpa, moved.slides, moved.gap_mm,
-                        followed)
+    plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, moved.displacement_mm, moved.traction_mpa, moved.slides, moved.gap_mm)
     attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}
     result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
                          np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
@@ -283,5 +282,5 @@ def _of_motion(sensor, moved, seconds, placed, motion):
                          flags=flags_elastic(moved.depth_mm, moved.sunk_mm, thickness_mm=sensor.spec.thickness_mm,
                                              dielectric_mm=sensor.spec.dielectric_thickness_mm),
                          frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown, plane=plane,
-                         **{name: getattr(moved, name) for name in _OF_MOTION})
+                         seen_object=followed, **{name: getattr(moved, name) for name in _OF_MOTION})
     return replace(result, attributes=result.attributes | attributes)

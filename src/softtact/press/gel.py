@@ -85,7 +85,7 @@ def gel_result(sensor: "Sensor", steps: Sequence[WideStep], seconds: Sequence[fl
               ("displacement_mm", "force_n", "path_mm", "slides", "gap_mm")}
     force = fields["force_n"].sum(axis=(1, 2))
     plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, fields["displacement_mm"], fields["force_n"] / area, fields["slides"],
-                        fields["gap_mm"], moved)
+                        fields["gap_mm"])
     depth, touching = np.array([step.position[2] for step in steps]), np.array([int((step.normal > 0).sum()) for step in steps])
     numbers: dict[str, Any] = {
         "displacement_mm": plane.displacement_mm, "force_n": force, "torque_nmm": _torques(spec, fields["force_n"]),
@@ -94,7 +94,7 @@ def gel_result(sensor: "Sensor", steps: Sequence[WideStep], seconds: Sequence[fl
         "frustum_compression_mm": unknown, "residual_n": unknown, "extrapolated_volume_fraction": unknown}
     result = make_result(sensor, "elastic", "conjugate gradients on Fourier transforms", -plane.displacement_mm[..., 2],
                          -force[:, 2], np.array(seconds[:len(steps)]), flags=_flags(spec, steps, depth, touching), plane=plane,
-                         **numbers)
+                         seen_object=moved, **numbers)
     return replace(result, attributes=result.attributes | {
         "friction_object": spec.friction.object, "friction": "of the object, Coulomb's", "point_area_mm2": area})
 

@@ -34,10 +34,10 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     lower_maps among these: maps of a lower side that moves; readings follow from the change of thickness
     felt_mm among these: the change of thickness that readings follow from, where it is known between the maps' points
     pressure among these: `Samples` of the contact pressure at each load step, where the model gives it
-    plane among these: the `PlaneMotion` of the map's points, where the model gives it
+    plane, seen_object among these: the `PlaneMotion` of the map's points and the rigid object, where the model gives them
     """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
-    lower_maps, pressure, plane = (numbers.pop(name, None) for name in ("lower_maps", "pressure", "plane"))
+    lower_maps, pressure, plane, seen = (numbers.pop(name, None) for name in ("lower_maps", "pressure", "plane", "seen_object"))
     if plane is not None:
         numbers["traction_mpa"] = plane.traction_mpa
     thinning = numbers.pop("felt_mm", maps if lower_maps is None else maps - lower_maps.reshape(maps.shape))
@@ -47,7 +47,7 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
     warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
     surface = layered_surface(spec, thinning, arrays.get("displacement_mm", -maps[..., None] * [np.nan, np.nan, 1.0]), pressure)
-    surface = surface if plane is None else replace(surface, plane=plane)
+    surface = replace(surface, plane=plane, object=seen)
     return PressResult(deformation_map_mm=maps, thinning_map_mm=thinning, readings=readings_of(sensor.readouts, surface),
                        normal_force_n=forces, wall_time_s=times, x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model,
                        sensor=spec.name, solver=solver, largest_counts=spec.largest_counts,

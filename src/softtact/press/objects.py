@@ -3,7 +3,7 @@ an object."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
@@ -17,6 +17,9 @@ from softtact.fem.solid_mesh import SolidMesh
 from softtact.geometry.meshes import misses_sensor
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
+
+if TYPE_CHECKING:
+    from softtact.imaging.pinhole import Pinhole
 
 OBJECT = "object"  # the frame of the pressed object
 _MIRROR = np.diag([1.0, 1.0, -1.0])
@@ -99,6 +102,20 @@ class PlacedObject:
         if self.turn is None:
             return moved
         return moved + np.einsum("sij,nj->sni", self.turn - np.eye(3), self.points_mm - self.about_mm)
+
+    def depths_mm(self, pinhole: "Pinhole", *, deepest_mm: float) -> np.ndarray:
+        """(step, row, column) in mm, single precision: depth below the surface at rest, z = 0, that a camera sees.
+
+        deepest_mm: where it ends. A z-buffer, `softtact.imaging.depth_image`.
+        """
+        from softtact.imaging.depth_image import DepthCamera
+
+        images = np.empty((len(self.way_mm), pinhole.rows, pinhole.columns), dtype=np.float32)
+        for step, points in enumerate(self.points_mm + self.displacement_mm):
+            mesh = trimesh.Trimesh(points, self.triangles, process=False)
+            camera = DepthCamera(mesh, pinhole, deepest_mm=deepest_mm, reach_mm=0.0, first_touch_mm=0.0)
+            images[step] = camera.image(0.0, np.zeros(2))
+        return images
 
     def variables(self) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
         """Variables of an xarray dataset; `of` reads them back."""

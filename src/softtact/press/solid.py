@@ -69,7 +69,7 @@ def press_pad(sensor: "Sensor", task: PressTask) -> PressResult:
         check_over_sensor(rigid, sensor.spec.footprint_mm)
         body = pad.with_rigid(rigid, threads=control.threads)
         control.reached.finish = partial(_finished, sensor, rigid, task)
-    gather = partial(_on_pad, pad, body, None if task.soft or not control.keep_object else rigid, control)
+    gather = partial(_on_pad, pad, body, None if task.soft else rigid, control)
     return control.reached.finish(run(body, OBJECT, task.motion, gather, control, _SMOOTH if task.soft else _ON_FACETS))
 
 
@@ -80,32 +80,36 @@ def _finished(sensor, rigid, task, result):
 
 
 def _on_pad(pad, body, rigid, control, steps):
-    """The result of load steps, in the sensor's frame, with solids and a rigid object where they are kept."""
+    """The result of load steps, in the sensor's frame, with solids and the object (None: a soft one) where they are kept."""
     down = np.array([0.0, 0.0, pad.height_mm])
     result = pad.result(body, steps, keep_body=control.keep_body)
+    placed = None if rigid is None else _placed_on_pad(pad, body, rigid, steps)
     if pad.sensor.spec.readouts:      # the default, taxels, needs no pressure
-        result = replace(result, readings=_readings_on_pad(pad, body, result, steps))
+        result = replace(result, readings=_readings_on_pad(pad, body, result, steps, placed))
     if control.keep_body:
         solid = gathered(body, steps)
         result = replace(result, solid=replace(solid, mesh=solid.mesh.moved(lambda x: x - down),
                                                object_points_mm=solid.object_points_mm - down))
-    if rigid is None:
-        return result
-    poses = [step.state.poses[0] for step in steps]
+    return replace(result, placed_object=placed) if control.keep_object else result
+
+
+def _placed_on_pad(pad, body, rigid, steps):
+    """A rigid object and its place at each load step, in the sensor's frame."""
+    poses, down = [step.state.poses[0] for step in steps], np.array([0.0, 0.0, pad.height_mm])
     lowered = np.array([0.0, 0.0, body.points[body.surface_nodes(OBJECT)][..., 2].min() - pad.height_mm - rigid.bounds[0, 2]])
-    return replace(result, placed_object=PlacedObject(
+    return PlacedObject(
         points_mm=np.asarray(rigid.vertices, dtype=float), triangles=np.asarray(rigid.faces, dtype=np.int64),
         way_mm=np.array([pose.translation for pose in poses]) + lowered, turn=np.array([pose.rotation for pose in poses]),
-        about_mm=body.frames[0].point - down - lowered))
+        about_mm=body.frames[0].point - down - lowered)
 
 
-def _readings_on_pad(pad, body, result, steps):
-    """The readings, with the contact pressure."""
+def _readings_on_pad(pad, body, result, steps, placed):
+    """The readings, with the contact pressure and a rigid object."""
     down = np.array([0.0, 0.0, pad.height_mm])
     contacts = [(step.state.histories[0].points, step.state.contacts[0]) for step in steps]
     pressure = [Samples(places(points, body.points) - down, points.weight, state.pressure) for points, state in contacts]
     surface = layered_surface(pad.sensor.spec, result.deformation_map_mm, result.displacement_mm, pressure)
-    return readings_of(pad.sensor.readouts, surface)
+    return readings_of(pad.sensor.readouts, surface if placed is None else replace(surface, object=placed))
 
 
 # --- sensors of kind solid ---

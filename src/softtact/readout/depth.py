@@ -34,8 +34,8 @@ class Depth(FiniteSection):
     def read(self, surface: SurfaceMotion) -> "xarray.DataArray":
         """See `Depth`. Raises InputError where the sensor has no such camera."""
         pinhole = camera_of(surface.spec, self.camera).pinhole
-        if surface.plane is not None and surface.plane.object is not None:
-            return labelled(surface.plane.object.depths_mm(pinhole, deepest_mm=self.max_mm), ("step", "y", "x"), units="mm")
+        if surface.object is not None:
+            return labelled(surface.object.depths_mm(pinhole, deepest_mm=self.max_mm), ("step", "y", "x"), units="mm")
         images = []
         for relief, depth in zip(reliefs(surface), object_depths(surface), strict=True):
             depth = np.clip(depth, 0.0, self.max_mm)

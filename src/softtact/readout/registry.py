@@ -28,7 +28,7 @@ from softtact.unknown_names import first_fault, nearest
 if TYPE_CHECKING:
     import xarray
 
-    from softtact.imaging.depth_image import MovedObject
+    from softtact.imaging.pinhole import Pinhole
 
 _KINDS: dict[str, type] = {}
 _Class = TypeVar("_Class", bound=type)
@@ -63,14 +63,19 @@ class PlaneMotion:
     gap_mm: np.ndarray
     """(step, ny, nx): along z to the object, whose underside is at displacement z + gap; 0 in contact up to the solver's tolerance,
     inf where no object is above."""
-    object: "MovedObject | None" = None
-    """What presses, and where it is at each step; None where there is none, or the model does not tell."""
 
     @classmethod
     def at_rest(cls, x_mm: np.ndarray, y_mm: np.ndarray) -> "PlaneMotion":
         """One step without any object."""
         shape = (1, len(y_mm), len(x_mm))
         return cls(x_mm, y_mm, np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape, dtype=bool), np.full(shape, np.inf))
+
+
+class SeenObject(Protocol):
+    """A rigid object at each step of a press."""
+
+    def depths_mm(self, pinhole: "Pinhole", *, deepest_mm: float) -> np.ndarray:
+        """(step, row, column): its depth below the surface at rest that a camera sees, 0 to the deepest."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +99,8 @@ class SurfaceMotion:
     plane: PlaneMotion | None = None
     """Displacement, traction, slip and gap at the points of the map, where the surface is plane and the model gives them: at rest,
     and in the elastic model's presses with a motion."""
+    object: "SeenObject | None" = None
+    """The rigid object, where the model tells where it is."""
 
 
 class Readout(Protocol):
