@@ -89,7 +89,7 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
         raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
                          "rigid mesh.")
     if sensor.spec.edge.far and model == "elastic":
-        return _by_motion(sensor, task, press_gel, threads=task.control.threads)
+        return _by_motion(sensor, task, press_gel)
     if task.motion.forces_n is not None:
         return _by_forces(sensor, task, choice.PRESSES[model], threads=task.control.threads if model == "elastic" else 1)
     motions = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
@@ -108,7 +108,7 @@ def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
     On a gel: elastic for all that it can follow.
     """
     if sensor.spec.edge.far and not task.soft and _flat(task.motion):
-        result = _by_motion(sensor, task, press_gel, threads=task.control.threads)
+        result = _by_motion(sensor, task, press_gel)
         return replace(result, selection_reason="a gel's sides are far: the elastic model, which gives traction and slip")
     if task.soft or task.motion.turns or task.motion.loaded_aside:
         return press_pad(sensor, task)

@@ -8,7 +8,6 @@ Both problems alternate, each as exactly as the other one's last change deserves
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -91,10 +90,12 @@ class _Tangential:
         self.rounding, self.diagonal = operator.rounding, np.full((operator.shape[0] * operator.shape[1], 2), operator.diagonal[1])
         self._of_normal = operator.diagonal[0] / operator.diagonal[1]
 
-    @cached_property
+    @property
     def largest_eigenvalue(self):
-        """Upper bound of the largest eigenvalue over the diagonal."""
-        return largest_eigenvalue(self, self.diagonal[:, :1])
+        """Upper bound of the largest eigenvalue over the diagonal, kept with the operator, which lives longer."""
+        if self._operator.largest_aside is None:
+            self._operator.largest_aside = largest_eigenvalue(self, self.diagonal[:, :1])
+        return self._operator.largest_aside
 
     def __matmul__(self, force):
         return self._operator.aside_of_aside(_on_grid(force, self._operator.shape)).reshape(2, -1).T

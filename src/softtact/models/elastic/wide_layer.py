@@ -105,6 +105,7 @@ class GridOperator:
 
     padded: shape (ny, nx) of the transforms;  spectrum_of_down: of the normal kernel, (nx / 2 + 1, ny)
     diagonal: displacements in mm/N of a point under its force down, and aside;  rounding: of its results
+    largest_aside: bound of its largest eigenvalue for forces aside over the diagonal, once a solver has asked for it
     """
 
     def __init__(self, layer: WideLayer, shape: tuple[int, int], dtype: type[np.floating]) -> None:
@@ -113,6 +114,7 @@ class GridOperator:
         self._spectra = {name: self._spectrum(layer.kernels[name], _PARITY[name]) for name in _ORDER}
         self.spectrum_of_down = self._spectra["nn"].astype(float)
         self.diagonal = float(layer.kernels["nn"][0, 0]), float(max(layer.kernels["xx"][0, 0], layer.kernels["yy"][0, 0]))
+        self.largest_aside: float | None = None
 
     def _spectrum(self, kernel, odd):
         """Spectrum of a kernel wrapped on the padded grid; its real part where it is even in all, else the imaginary one."""
