@@ -67,6 +67,12 @@ def test_data_that_are_not_there_are_named_with_their_source(tmp_path, monkeypat
         gel_data(str(tmp_path), "fots/presses.csv")
 
 
+def test_a_judged_variant_that_is_none_is_refused():
+    values = yaml.safe_load(open("config/real.yaml", encoding="utf-8"))["gel_force"]
+    with pytest.raises(InputError, match="gel_force.judged is 'sliding', which is no variant; name one of slipping, "):
+        load_study({"gel_force": values | {"judged": "sliding"}})
+
+
 def test_a_wheel_without_the_set_is_refused(tmp_path):
     (tmp_path / "taxim-1.4.1-py3-none-any.whl").write_bytes(b"no wheel")
     with pytest.raises(InputError, match="it holds no calibration 'gelsight' of taxim==1.4.1"):
@@ -116,7 +122,7 @@ def test_forces_of_a_known_modulus_give_it_back_and_check_points_stay_unfitted(t
     point = [{"depth_mm": depth, "force_n": 0.16 * float(path.at(depth))} for depth in (0.5, 1.5, 1.0)]
     ratio = 20
     settings = {"gel_force": {"ball_mm": 7.5, "height_mm": 4.0, "source": "made", "points": point[:2], "check_points": point[2:],
-                              "depths_mm": [0.5, 1.0, 1.5], "variants": {"only": {"bulk_over_shear": ratio}}}}
+                              "depths_mm": [0.5, 1.0, 1.5], "judged": "only", "variants": {"only": {"bulk_over_shear": ratio}}}}
     write_path(tmp_path / "path.nc", path, {})
     fit_modulus(inputs={"path_only": tmp_path / "path.nc"}, outputs={"table": tmp_path / "t.csv", "facts": tmp_path / "f.json"},
                 settings=settings)
@@ -145,8 +151,9 @@ def test_a_gel_is_fitted_to_a_drawn_image_and_compared(tmp_path):
 
 def tables(depth_error, markers, mae):
     """Tables of the claims, with one number of each part."""
-    force = pd.DataFrame({"variant": ["a", "a", "elastic layer"], "fitted_to": ["all", "0.5 mm", "all"],
-                          "depth_mm": [0.5, 1.5, 0.5], "depth_error": [depth_error] * 3, "fitted": [True, False, True]})
+    force = pd.DataFrame({"variant": ["a", "a", "b", "b", "elastic layer"], "fitted_to": ["all", "0.5 mm", "all", "0.5 mm", "all"],
+                          "depth_mm": [0.5, 1.5, 0.5, 1.5, 0.5], "depth_error": [0.9, 0.9, *[depth_error] * 3],
+                          "fitted": [True, False, True, False, True]})
     models = ["finite strain, stick and slip", "FOTS' formulas", "one linear layer"]
     motion = pd.DataFrame({"image": "first", "model": [*models, "thin-plate spline, left out"], "camera": ["shift"] * 3 + ["none"],
                            "components": markers})
@@ -160,7 +167,7 @@ def tables(depth_error, markers, mae):
 
 def verdicts(*numbers, made=False, stated=20.0):
     found = claims_of_real(tables(*numbers), limits={"s": 4.0}, made={"s": made}, stated={"s": stated}, markers_made=made,
-                           sheared=["shear"])
+                           sheared=["shear"], judged="b")
     return list(found.verdict)
 
 

@@ -14,29 +14,30 @@ MADE = "made data: nothing was measured"
 
 
 def claims_of_real(tables: Mapping[str, pd.DataFrame], *, limits: Mapping[str, float | None], made: Mapping[str, bool],
-                   stated: Mapping[str, float | None], markers_made: bool, sheared: list[str]) -> pd.DataFrame:
+                   stated: Mapping[str, float | None], markers_made: bool, sheared: list[str],
+                   judged: str) -> pd.DataFrame:
     """Data frame with `decisions.COLUMNS`.
 
     limits: MAE in grey levels by set;  made: sets that the study drew itself;  stated: radius of the ball in px where it is known
+    judged: variant of the gel's force that decides
     """
-    rows = [*_force(tables["gel_force"]), *_markers(tables["markers"], tables["other_markers"], markers_made, sheared)]
+    rows = [*_force(tables["gel_force"], judged), *_markers(tables["markers"], tables["other_markers"], markers_made, sheared)]
     for name, limit in limits.items():
         rows += _shading(name, tables["shading"], limit, made[name])
     rows += [_size(name, own, made[name], stated[name]) for name, own in tables["ball_size"].groupby("set", sort=False)]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _force(table):
-    first = table.variant.iloc[0]
+def _force(table, judged):
     points = table.depth_mm.nunique()
     for to, words in (("all", "One modulus gives the depth of every measured force"),
                       ("one", "A modulus fitted to one measured force gives the depth of another")):
-        own = table[(table.variant == first) & ((table.fitted_to == "all") if to == "all" else ~table.fitted)]
+        own = table[(table.variant == judged) & ((table.fitted_to == "all") if to == "all" else ~table.fitted)]
         worst = own.depth_error.abs().max()
         layer = table[(table.variant == ELASTIC) & (table.fitted_to == "all")].depth_error.abs().max()
         yield row(words, "force on a GelSight Mini", f"within {DEPTH_ERROR:.0%}",
                   f"largest error {worst:.1%} ({'fitted' if to == 'all' else 'predicted'}); layer {layer:.1%}, fitted",
-                  verdict_of(bool(worst <= DEPTH_ERROR)), "depth at the measured force, first variant", "tables/gel_force.csv",
+                  verdict_of(bool(worst <= DEPTH_ERROR)), f"depth at the measured force, variant {judged}", "tables/gel_force.csv",
                   uncertainty=f"{points} points; variants of contact and compressibility in the table")
 
 

@@ -44,7 +44,8 @@ class GelForce(Section):
     points: Annotated[list[ForcePoint], Field(min_length=2)] = Field(description="measured; one modulus is fitted to all of them")
     check_points: list[ForcePoint] = Field([], description="measured, but never fitted: predicted with the modulus of all points")
     depths_mm: Annotated[list[PositiveFloat], Field(min_length=2)] = Field(description="rising, at which forces are computed")
-    variants: Annotated[dict[Name, ForceVariant], Field(min_length=1)] = Field(description="assumptions by name; the first decides")
+    variants: Annotated[dict[Name, ForceVariant], Field(min_length=1)] = Field(description="assumptions by name")
+    judged: Name = Field(description="the variant whose depths decide; the linear layer has its compressibility")
 
 
 class MarkerPath(Section):
@@ -119,6 +120,9 @@ class RealValues(Section):
         if deepest > self.gel_force.depths_mm[-1]:
             last = self.gel_force.depths_mm[-1]
             raise ValueError(f"gel_force.depths_mm ends at {last:g} mm, before the point at {deepest:g} mm; add it")
+        if self.gel_force.judged not in self.gel_force.variants:
+            raise ValueError(f"gel_force.judged is {self.gel_force.judged!r}, which is no variant; name one of "
+                             f"{', '.join(self.gel_force.variants)}")
         if unknown := [name for name in self.markers.sheared if name not in self.markers.others]:
             raise ValueError(f"markers.sheared has {unknown[0]!r}, which is not among markers.others; add it there")
         return self

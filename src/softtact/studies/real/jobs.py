@@ -116,7 +116,8 @@ class _Jobs:
         stated = {name: one.ball_px if one.stated else None for name, one in self.values.shading.sets.items()}
         judge = Job("judge", tables, {"claims": self.table("claims")},
                     {"limits": limits, "made": made, "stated": stated,
-                     "markers_made": self.markers.image == "made", "sheared": self.markers.sheared})
+                     "markers_made": self.markers.image == "made", "sheared": self.markers.sheared,
+                     "judged": self.values.gel_force.judged})
         figures = [f"{self.folder}/figures/{name}.png" for name in FIGURES]
         facts = [f"{self.folder}/presses/{name}.json" for name in self.sets]
         return [judge, Job("report", {**tables, "claims": self.table("claims"), "figures": figures, "facts": facts,

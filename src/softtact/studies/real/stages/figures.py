@@ -42,7 +42,7 @@ def draw_gel_force(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 def _force_path(name, inputs, values):
     if name != ELASTIC:
         return read_path(inputs[f"path_{name}"])
-    ratio = next(iter(values["variants"].values()))["bulk_over_shear"]
+    ratio = values["variants"][values["judged"]]["bulk_over_shear"]
     return elastic_path(values["ball_mm"], values["height_mm"], (3 * ratio - 2) / (6 * ratio + 2), values["depths_mm"])
 
 

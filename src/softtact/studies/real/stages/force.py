@@ -33,16 +33,15 @@ def fit_modulus(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     curves = {name: _curves(name, inputs, values) for name in [*values["variants"], ELASTIC]}
     table = pd.concat([_of_variant(name, path, ratio, points, checks) for name, (path, ratio) in curves.items()])
     write_csv(outputs["table"], table)
-    first = next(iter(values["variants"]))
-    fitted = table[(table.variant == first) & (table.fitted_to == "all")]
-    write_json(outputs["facts"], {"variant": first, "c10_mpa": float(fitted.c10_mpa.iloc[0]),
+    fitted = table[(table.variant == values["judged"]) & (table.fitted_to == "all")]
+    write_json(outputs["facts"], {"variant": values["judged"], "c10_mpa": float(fitted.c10_mpa.iloc[0]),
                                   "largest_depth_error": float(fitted.depth_error.abs().max()), "source": values["source"]})
 
 
 def _curves(name, inputs, values):
     """Force over G of a depth, depth of a force over G, and E over G, of a variant."""
     if name == ELASTIC:
-        one = next(iter(values["variants"].values()))
+        one = values["variants"][values["judged"]]
         poisson = (3 * one["bulk_over_shear"] - 2) / (6 * one["bulk_over_shear"] + 2)
         path = elastic_path(values["ball_mm"], values["height_mm"], poisson, values["depths_mm"])
         return path, 2 * (1 + poisson)

@@ -20,7 +20,7 @@ _CAPTIONS = {
 
 
 def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Write the table of claims.  inputs: the tables (CSV);  outputs: claims;  settings: limits, made, markers_made, sheared"""
+    """Write the table of claims.  inputs: the tables (CSV);  outputs: claims;  settings: of `claims_of_real`"""
     tables = {name: pd.read_csv(path) for name, path in inputs.items()}
     write_csv(outputs["claims"], claims_of_real(tables, **settings))
 
