@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from softtact.errors import ExtrapolationWarning, InputError
-from softtact.files import write_json
+from softtact.files import read_json, write_json
 from softtact.materials.card_making import difference, make_card, partings, paths_inside, paths_outside
-from softtact.materials.cards import law_from_card, linear_from_card, load_card
+from softtact.materials.cards import law_from_card, linear_from_card, load_card, write_card
 from softtact.materials.consistency import disagreements
 from softtact.materials.curves import Curve, VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
@@ -27,10 +27,20 @@ def card(curves_of):
 
 
 def test_a_card_survives_its_file(card, tmp_path):
-    write_json(tmp_path / "foam.json", card)
+    write_card(tmp_path / "foam.json", card)
     again = load_card(tmp_path / "foam.json")
     assert again == json.loads(json.dumps(card))
     assert law_from_card(again).parameters == pytest.approx(TRUTH, rel=1e-6)
+
+
+def test_a_card_of_which_a_digit_changed_is_refused_unless_it_is_meant(card, tmp_path):
+    path = tmp_path / "foam.json"
+    write_card(path, card)
+    path.write_text(path.read_text().replace("0.1729", "0.1739", 1))
+    with pytest.raises(InputError, match="foam.json, field 'digest': the contents are not those .*; delete the field"):
+        load_card(path)
+    write_json(path, {name: value for name, value in read_json(path).items() if name != "digest"})
+    assert load_card(path)["chosen"] == card["chosen"]
 
 
 def test_a_card_says_what_it_was_fitted_to(card):

@@ -52,8 +52,8 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _fit(options):
-    from softtact.files import write_json
     from softtact.materials.card_making import make_card, misfit_warnings
+    from softtact.materials.cards import write_card
     from softtact.materials.making import curves_of
     from softtact.materials.readers import read_curves
 
@@ -66,7 +66,7 @@ def _fit(options):
         curves, settings = read_curves(options.curves, **_reading(options)), {}
     _refuse_idle(options, curves, settings)
     card = make_card(curves, **settings | _fit_settings(options))
-    write_json(options.out, card)
+    write_card(options.out, card)
     if options.plot:
         from softtact.studies.hybrid.figures.material_plot import plot_material
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import pydantic
 
 from softtact.errors import InputError
-from softtact.files import read_json
+from softtact.files import digest, read_json, write_json
 from softtact.materials.config import validated
 from softtact.materials.curves import principal_window
 from softtact.materials.laws.base import Law
@@ -33,9 +33,18 @@ class _Card(pydantic.BaseModel):
     strain_window: dict[str, Annotated[list[pydantic.PositiveFloat], pydantic.Field(min_length=2, max_length=2)]] = {}
 
 
+def write_card(path: str | Path, card: dict[str, Any]) -> None:
+    """Write a card as JSON with a digest of its contents."""
+    write_json(path, card | {"digest": digest(card)})
+
+
 def load_card(path: str | Path) -> dict[str, Any]:
-    """Read a card, the mapping that `softtact fit` wrote; other files are refused."""
+    """Read a card, the mapping that `write_card` wrote; others are refused, and one whose contents do not fit its digest."""
     card = read_json(path)
+    stated = card.pop("digest", None) if isinstance(card, dict) else None
+    if stated is not None and stated != digest(card):
+        raise InputError(f"{path}, field 'digest': the contents are not those that were written; delete the field if you edited "
+                         "them on purpose, else take a copy of the file or fit again.")
     missing = [key for key in ("material", "kind", "chosen", "laws") if not isinstance(card, dict) or key not in card]
     if missing:
         raise InputError(f"{path}: not a material card, it lacks {', '.join(missing)}; write it with `softtact fit`.")

@@ -17,6 +17,7 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.files import PROVENANCE, read_arrays, read_dataset, write_dataset
+from softtact.inputs import in_one_sentence
 from softtact.models.solid.result import SolidFields
 from softtact.press.objects import PlacedObject
 from softtact.readout.points import labelled_points
@@ -344,6 +345,12 @@ def read_press(path: str | Path) -> PressResult:
     it is missing or damaged, or holds no press.
     """
     data = _read_npz(path) if Path(path).suffix.lower() == ".npz" else read_dataset(path)
+    with in_one_sentence(path, "it holds no whole press", "give a file that softtact press --out or PressResult.write made"):
+        return _press_of(path, data)
+
+
+def _press_of(path, data):
+    """The `PressResult` of a file's data set."""
     if data.attrs.get("kind") == _OLD_KIND:
         data = _renewed(path, data)
     elif "kind" in data.attrs and "deformation_map_mm" not in data:

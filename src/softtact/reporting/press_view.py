@@ -12,6 +12,7 @@ from softtact.errors import InputError
 from softtact.fem.mesh_files import check_mesh_file, read_mesh_file
 from softtact.fem.solid_mesh import outer_triangles
 from softtact.files import atomic_path, read_dataset
+from softtact.inputs import in_one_sentence
 from softtact.press.objects import PlacedObject
 from softtact.press.result import read_press
 from softtact.press.vtu import of_map, read_vtu
@@ -52,6 +53,11 @@ def read_view(path: str | Path) -> PressView:
     if ending not in (".nc", ".vtu", ".npz"):
         raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press, or the .csv of a "
                          "recording.")
+    with in_one_sentence(path, "not a press that can be shown", "give what softtact press wrote"):
+        return _view_of(path, ending)
+
+
+def _view_of(path, ending):
     if ending == ".vtu":
         check_mesh_file(path)
         of_solids = b'"region:' in path.read_bytes()
