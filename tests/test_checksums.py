@@ -120,3 +120,14 @@ def test_a_network_with_code_in_it_is_refused_without_advice_to_run_it(tmp_path)
     with pytest.raises(InputError, match="model.pt: not a network's file") as refusal:
         load(path)
     assert "weights_only" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("ending", checksums.SEALED)
+def test_each_kind_of_binary_file_gets_a_checksum_when_it_is_written(ending, tmp_path):
+    path = tmp_path / f"file{ending}"
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(b"contents")
+    assert checksums.check(path)
+    path.write_bytes(path.read_bytes().replace(b"contents", b"contentt"))
+    with pytest.raises(InputError, match="its contents do not fit its checksum, so it was damaged after it was written"):
+        checksums.check(path)
