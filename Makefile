@@ -4,7 +4,7 @@
 # `make real`: gels with a camera against measured data, which docs/how-to/real_gels.md names.
 # `make everything`: all default studies.  `make studies`: the smallest forms of all.  `make overview`: Snakemake's report of them.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
-# `make results`: the results page in docs/, from a finished run of the default study.
+# `make results`: the results pages in docs/, from the finished runs of default studies.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
@@ -79,9 +79,11 @@ docs: numbers
 numbers: .venv/tested
 	$(BIN)/python scripts/write_numbers.py
 
-# The page docs/results.md from a finished run of the default study.
+# The page docs/results.md from a finished run of the default study, and docs/results/STUDY.md from those of others.
 results: .venv/installed
-	$(BIN)/python scripts/write_results.py results/default
+	[ ! -e results/default/report.html ] || $(BIN)/python scripts/write_results.py results/default
+	for study in skin probe grasps decide markers real; do \
+		[ ! -e results/$$study/report.html ] || $(BIN)/python scripts/write_study_results.py results/$$study || exit 1; done
 
 clean:
 	rm -rf results/*/ .snakemake

@@ -207,8 +207,10 @@ def page(made: dict[str, object]) -> str:
 def write(run: Path) -> None:
     """Write page, tables and pictures of a run."""
     made = provenance(run)
-    shutil.rmtree(FOLDER, ignore_errors=True)
-    FOLDER.mkdir(parents=True)
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for kept in FOLDER.iterdir():
+        if kept.is_file() and kept.suffix != ".md":     # pages and folders are of other studies
+            kept.unlink()
     for name in FIGURES:
         if (run / "figures" / f"{name}.png").is_file():
             small(run / "figures" / f"{name}.png", FOLDER / f"{name}.png")
