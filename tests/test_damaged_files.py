@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import xarray
 
-from softtact.errors import InputError, OutputError
+from softtact.errors import InputError
 from softtact.files import atomic_path, read_dataset, read_json, write_csv, write_dataset, write_json
 from softtact.models.elastic.compliance import Compliance
 from softtact.models.foundation.compliance import FoundationCompliance
@@ -75,7 +75,7 @@ def test_a_stage_on_a_full_disk_says_so_and_leaves_nothing(tmp_path):
                                    lambda path: write_csv(path, pd.DataFrame({"a": [1]}))])
 def test_where_a_folder_cannot_be_made_the_file_is_named(tmp_path, write):
     (tmp_path / "results").write_text("a file, where a folder is wanted")
-    with pytest.raises(OutputError, match="results/tables/a.nc: cannot be written"):
+    with pytest.raises(InputError, match="results/tables/a.nc: a part of its path is a file, not a folder"):
         write(tmp_path / "results/tables/a.nc")
 
 

@@ -34,14 +34,14 @@ LIMITS = {
     "json": Limit(20e6, "bytes", "a JSON file"),
     "table": Limit(100e6, "bytes", "a table or recording of text"),
     "archive": Limit(4e9, "bytes", "a table of the published archive"),
-    "workbook": Limit(50e6, "bytes", "a workbook, unpacked"),
+    "workbook": Limit(50e6, "bytes", "a workbook (unpacked)"),
     "cells": Limit(2e6, "cells", "a sheet, with its empty ones"),
-    "mesh": Limit(300e6, "bytes", "a mesh file, unpacked"),
+    "mesh": Limit(300e6, "bytes", "a mesh file (unpacked)"),
     "facets": Limit(4e6, "facets", "a mesh"),
-    "arrays": Limit(16e9, "bytes", "a file of arrays, unpacked"),
+    "arrays": Limit(4e9, "bytes", "a file of arrays (unpacked)"),
     "picture": Limit(1e9, "bytes", "a picture file"),
     "pixels": Limit(100e6, "pixels", "a picture"),
-    "movie": Limit(20e9, "bytes", "a movie or a stack of pictures"),
+    "movie": Limit(20e9, "bytes", "a movie, or images in one file"),
 }
 
 
@@ -88,6 +88,7 @@ def no_name(error: OSError | ValueError) -> str:
     if isinstance(error, ValueError):
         return "its name holds a zero byte; give another name"
     reasons = {errno.ELOOP: "its links lead in a circle; correct them",
+               errno.ENOTDIR: "a part of its path is a file, not a folder; give another place",
                errno.ENAMETOOLONG: "its name is too long; give a shorter one"}
     return reasons.get(error.errno or 0, f"it cannot be reached ({error.strerror or error}); give another place")
 

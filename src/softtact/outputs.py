@@ -37,11 +37,9 @@ def target_of(path: str | Path) -> Path:
         if not stat.S_ISREG(mode):
             raise InputError(f"{path}: it is a {'folder' if stat.S_ISDIR(mode) else 'device or a pipe'}; give the name of a file.")
         if not os.access(path, os.W_OK):
-            raise not_written(path, PermissionError(errno.EACCES, "the file is there and read-only"))
+            raise OutputError(f"{path}: it is there and read-only; make it writable, or give another name.")
     except FileNotFoundError:
         pass
-    except NotADirectoryError:
-        raise not_written(path, OSError(errno.ENOTDIR, "a part of its path is a file, not a folder")) from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: {no_name(error)}.") from None
     return Path(os.path.realpath(path))

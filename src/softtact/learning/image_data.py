@@ -92,7 +92,7 @@ def open_sequences(paths: Sequence[str | Path], *, split: str, longest_only: boo
 
 def _bytes_of(path):
     """Size of a file, after a check that it can be read."""
-    check_input(path, "arrays")
+    check_input(path, "movie")
     return Path(path).stat().st_size
 
 

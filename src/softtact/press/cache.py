@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
+from softtact.checksums import check, seal
 from softtact.errors import InputError, OutputError, SofttactError
 from softtact.files import atomic_path, digest
 from softtact.materials.laws.base import Law
@@ -106,6 +107,7 @@ def _cached(kind, values, cls, message, compute):
     path = _file(kind, values)
     if path is not None and path.exists():
         try:
+            _seal(path)
             return cls.load(path)
         except InputError as error:
             _warn(f"{error} It is computed again.")
@@ -118,9 +120,16 @@ def _cached(kind, values, cls, message, compute):
             prepared.save(temporary)
         return cls.load(path)
     except (SofttactError, OSError) as error:
-        _warn(f"{error} What was computed is not kept, so that the next run computes it again; set XDG_CACHE_HOME to a folder with "
-              "room in which files can be written.")
+        _warn(f"What was computed is not kept ({str(error).partition(';')[0].rstrip('.')}), so the next run computes it again; set "
+              "XDG_CACHE_HOME to a folder with room in which files can be written.")
     return prepared
+
+
+def _seal(path):
+    """Add a checksum to a file that an older version kept without."""
+    with contextlib.suppress(OSError):
+        if not check(path):
+            seal(path)
 
 
 @cache
