@@ -115,6 +115,14 @@ def _same_file(one, other):
         return os.path.realpath(one) == os.path.realpath(other)
 
 
+def cache_folder() -> Path:
+    """The user's folder for what can be made or fetched again; OutputError where there is no home folder."""
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "softtact"
+    except RuntimeError:
+        raise OutputError("There is no home folder; set XDG_CACHE_HOME to a folder in which files can be written.") from None
+
+
 def temporary_file(folder: Path, suffix: str) -> Path:
     """A new empty file in a folder, under a name of this process; what killed processes left there is deleted."""
     _delete_left(folder)

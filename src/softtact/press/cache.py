@@ -2,10 +2,8 @@
 
 import contextlib
 import math
-import os
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 
 from softtact.checksums import check, seal
 from softtact.errors import InputError, OutputError, SofttactError
@@ -15,6 +13,7 @@ from softtact.models.elastic.compliance import Compliance, elastic_compliance
 from softtact.models.elastic.tangential import SurfaceCompliance, surface_compliance
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
+from softtact.outputs import cache_folder
 from softtact.progress import announce
 from softtact.sensors.frusta import Friction, SensorSpec
 from softtact.sensors.specification import AnySpec
@@ -70,8 +69,7 @@ def cached_frustum_law(spec: SensorSpec, law: Law) -> FrustumLaw:
 
 def seconds_to_prepare_foundation(spec: SensorSpec, laws: Mapping[str, Law]) -> float:
     """Estimated time of `cached_foundation` on two cores; 0 if it is cached."""
-    path = _file("foundation", _of_foundation(spec, laws))
-    return 0.0 if path is not None and path.exists() else _seconds(spec, *_FOUNDATION_TAKES)
+    return 0.0 if _is_there("foundation", _of_foundation(spec, laws)) else _seconds(spec, *_FOUNDATION_TAKES)
 
 
 def _of_foundation(spec, laws):
@@ -95,27 +93,27 @@ def _seconds(spec, seconds, power):
 
 
 def _file(kind, values):
-    """The file of prepared data, or None where there is no home folder for it."""
-    with contextlib.suppress(RuntimeError):     # of Path.home
-        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "softtact"
-        return cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
-    return None
+    return cache_folder() / f"{kind}-{digest([_FORMAT, *values])}.npz"
+
+
+def _is_there(kind, values):
+    with contextlib.suppress(OutputError):
+        return _file(kind, values).exists()
+    return False
 
 
 def _cached(kind, values, cls, message, compute):
     """The prepared data of a file; computed, with a word, where the file is missing or damaged, and kept where that is possible."""
-    path = _file(kind, values)
-    if path is not None and path.exists():
+    if _is_there(kind, values):
         try:
-            _seal(path)
-            return cls.load(path)
+            _seal(_file(kind, values))
+            return cls.load(_file(kind, values))
         except InputError as error:
             _warn(f"{error} It is computed again.")
     announce(message)
     prepared = compute()
     try:
-        if path is None:
-            raise OutputError("there is no home folder for prepared data.")
+        path = _file(kind, values)
         with atomic_path(path) as temporary:
             prepared.save(temporary)
         return cls.load(path)

@@ -2,7 +2,6 @@
 
 import hashlib
 import sys
-import tempfile
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from softtact.files import atomic_path, write_csv, write_json
 from softtact.imaging.ball_presses import BallPress, Gel
 from softtact.imaging.marker_motion import COLUMNS, MarkerMotion
 from softtact.imaging.shading import PhongShading
+from softtact.outputs import cache_folder, temporary_folder
 from softtact.processes import run_tied
 from softtact.studies.real.config import gel_data
 
@@ -54,7 +54,7 @@ def _of_wheel(name, folder):
     """Presses of PyPI's taxim, and its table."""
     wheel = _wheel(folder)
     try:
-        with zipfile.ZipFile(wheel) as archive, tempfile.TemporaryDirectory() as place:
+        with zipfile.ZipFile(wheel) as archive, temporary_folder() as place:
             packed = archive.extract(f"taxim/calib/{name}/dataPack.npz", place)
             table = archive.extract(f"taxim/calib/{name}/polycalib.npz", place)
             with np.load(packed, allow_pickle=False) as data, np.load(table, allow_pickle=False) as found:
@@ -68,7 +68,7 @@ def _of_wheel(name, folder):
 
 def _wheel(folder):
     """The wheel's file; pip downloads it into the user's cache where no folder has it. Nothing of it is installed or run."""
-    place = Path(folder) if folder else Path.home() / ".cache" / "softtact" / "taxim"
+    place = Path(folder) if folder else cache_folder() / "taxim"
     if found := sorted(place.glob("taxim-1.4.1-*.whl")):
         return found[0]
     place.mkdir(parents=True, exist_ok=True)
