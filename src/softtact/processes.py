@@ -93,8 +93,8 @@ def map_in_processes(function: Callable[[_Item], _Result], items: Sequence[_Item
     try:
         yield from pool.map(_work, items, chunksize=max(1, len(items) // (8 * workers)))
     except BrokenProcessPool:
-        raise WorkerError(f"One of {workers} processes was killed, most likely because memory ran out; run again with fewer "
-                          "processes (workers) or smaller meshes.") from None
+        raise WorkerError("A process that worked for this one was killed or crashed, most likely because memory ran out; run again "
+                          "with fewer processes (workers), or with smaller or coarser meshes.") from None
     except BaseException:
         for process in list((pool._processes or {}).values()):     # an executor would wait for them; Python 3.14: kill_workers()
             process.kill()

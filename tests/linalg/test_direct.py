@@ -40,6 +40,17 @@ def test_a_solution_balances_its_right_side(name):
             np.testing.assert_allclose(whole @ found, right, atol=(tolerance + rounded) * np.abs(right).max())
 
 
+def test_on_several_threads_each_run_makes_its_sums_in_the_same_order():
+    _, upper = box(16)
+    found, right = set(), np.random.default_rng(0).normal(size=upper.shape[0])
+    for _ in range(4):
+        solver = PardisoSolver(threads=4)
+        assert solver.factor(upper)
+        found.add(solver.solve(right).tobytes())
+        solver.close()
+    assert len(found) == 1
+
+
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_factored(name):
     whole, upper = box()

@@ -13,6 +13,15 @@ from softtact.skin.layout import module_layout
 from softtact.skin.loads import Load, disc, ellipse
 
 
+def test_readings_are_the_same_bytes_on_any_number_of_threads():
+    load = disc((8.0, 4.0), diameter_mm=6.0, pressure_mpa=0.05)
+    found = set()
+    for threads in (1, 4):
+        skin = small_skin(threads=threads)
+        found.add(skin.field(skin.layer.displacement(load, young_mpa=0.3)).capacitance_ff.tobytes())
+    assert len(found) == 1
+
+
 def test_a_field_of_degree_two_is_interpolated_exactly_within_the_layer():
     mesh = LayerMesh(even_mesh(module_layout(), spacing_mm=5.0), np.array([0.0, 0.7, 2.0]))
     rng = np.random.default_rng(0)

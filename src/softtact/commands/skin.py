@@ -31,7 +31,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--out", type=Path, required=True, metavar="FOLDER", help="the folder of the results; report.html is the page"
     )
     command.add_argument(
-        "--threads", type=int, default=os.cpu_count() or 1, metavar="N", help="of the solvers (default: all cores)"
+        "--threads", type=int, default=os.cpu_count() or 1, metavar="N", help="of the solver at finite strains (default: all cores)"
     )
 
 

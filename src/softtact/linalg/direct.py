@@ -49,6 +49,7 @@ class PardisoSolver:
     # Entries of iparm, counted from 0: no default values, METIS on one thread (the same order whatever the number of threads), and
     # no iterative refinement, which makes a solve four times as long for digits that Newton's method does not need.
     _PARAMETERS = {0: 1, 1: 2, 7: 0, 17: -1, 18: -1}
+    _REPRODUCIBLE_ON = 33     # the entry of iparm with the number of threads on which each run makes its sums in the same order
     _FROM_ZERO = 34     # the entry of iparm that lets rows and columns be counted from 0
     _pattern: tuple[np.ndarray, np.ndarray] | None
 
@@ -58,6 +59,8 @@ class PardisoSolver:
         for entry, value in self._PARAMETERS.items():
             self._solver.set_iparm(entry + 1, value)
         self._solver.set_iparm(self._FROM_ZERO + 1, 1)
+        if threads > 1:
+            self._solver.set_iparm(self._REPRODUCIBLE_ON + 1, threads)
         # Factors live outside Python's memory, where they would outlive a solver that nobody closed.
         weakref.finalize(self, self._solver.free_memory, everything=True).atexit = False
 

@@ -140,7 +140,7 @@ class Skin:
         self.layout, self.thickness_mm, self.permittivity, self.threads = layout, thickness_mm, permittivity, threads
         self.layer = BondedLayer(
             LayerMesh(even_mesh(layout, spacing_mm=mesh.spacing_mm), np.linspace(0.0, thickness_mm, mesh.layers + 1)),
-            poisson=poisson, threads=threads)
+            poisson=poisson)
         self.field_mesh = LayerMesh(taxel_mesh(layout, spacing_mm=mesh.field_spacing_mm),
                                     np.linspace(0.0, thickness_mm, mesh.field_layers + 1))
 
@@ -157,8 +157,7 @@ class Skin:
     def field(self, displacement_mm: np.ndarray | None = None) -> ElectricField:
         """The field after a displacement (node, 3) of the layer's nodes, or at rest."""
         moved = None if displacement_mm is None else self.to_field @ displacement_mm
-        return ElectricField(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved,
-                             threads=self.threads)
+        return ElectricField(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved)
 
     @cached_property
     def to_field(self) -> sp.csr_matrix:

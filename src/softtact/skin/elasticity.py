@@ -20,8 +20,8 @@ class BondedLayer:
     Displacements are inversely proportional to Young's modulus, so stiffness and factors are those of 1 MPa.
     """
 
-    def __init__(self, mesh: LayerMesh, *, poisson: float, threads: int = 1) -> None:
-        self.mesh, self.poisson, self._threads = mesh, poisson, threads
+    def __init__(self, mesh: LayerMesh, *, poisson: float) -> None:
+        self.mesh, self.poisson = mesh, poisson
         nodes = len(mesh.nodes_mm)
         free = np.setdiff1d(np.arange(nodes), mesh.floor)
         self._free = (free + nodes * np.arange(3)[:, None]).ravel()  # first x of all nodes, then y, then z
@@ -49,7 +49,7 @@ class BondedLayer:
 
     @cached_property
     def _solver(self):
-        solver = make_solver(threads=self._threads)
+        solver = make_solver()     # on one thread: on more, its sums, and so the last digits, depend on their number
         if not solver.factor(upper_triangle(self._stiffness[self._free][:, self._free])):
             raise ArithmeticError("The layer's stiffness is not positive definite.")
         return solver

@@ -34,8 +34,8 @@ class ElectricField:
     """
 
     def __init__(self, mesh: LayerMesh, layout: Layout, *, permittivity: float, displacement_mm: np.ndarray | None = None,
-                 threads: int = 1, order: int = 2) -> None:
-        self._layout, self._threads = layout, threads
+                 order: int = 2) -> None:
+        self._layout = layout
         self._permittivity = VACUUM_FF_PER_MM * permittivity
         moved = mesh.nodes_mm if displacement_mm is None else mesh.nodes_mm + displacement_mm
         self.basis = Basis(displaced(mesh.mesh, moved), ElementTetP2(), intorder=order)
@@ -96,7 +96,7 @@ class ElectricField:
     def _solved(self, potential):
         """Potentials (node, k), given on the electrodes, with those of the free nodes filled in."""
         rows = self._matrix[self._free]
-        solver = make_solver(threads=self._threads)
+        solver = make_solver()     # on one thread, as in `BondedLayer`
         solver.factor(upper_triangle(rows[:, self._free]))
         potential[self._free] = solver.solve(np.ascontiguousarray(-(rows @ potential)))
         solver.close()
