@@ -2,8 +2,9 @@
 
     python scripts/compare_results.py ONE/results OTHER/results
 
-Left out: columns of wall times (their names end in `_s`, or are `machine`), files named timing.csv, what is made of nothing but
-times (table3_timing.csv, the claims on times), and what tells a run (run.csv, logs, benchmarks, pictures, pages, Optuna's journal).
+Left out: columns and attributes of wall times (their names end in `_s`, or are `machine` or `load_per_core`), files named
+timing.csv, what is made of nothing but times (table3_timing.csv, the claims on times), and what tells a run (run.csv, logs,
+benchmarks, pictures, pages, Optuna's journal).
 Everything else that is there must be there in both, and equal. Exit status 1 where it is not.
 """
 
@@ -48,13 +49,13 @@ def content(path):
         return kept.to_csv(index=False).encode()
     if path.suffix == ".nc":
         data = xarray.load_dataset(path, engine="h5netcdf")
-        kept = data.drop_vars([name for name in data.variables if name.endswith("_s")])
-        return b"".join(_bytes(name, kept[name]) for name in sorted(kept.variables)) + repr(sorted(kept.attrs.items())).encode()
+        attributes = sorted((name, value) for name, value in data.attrs.items() if not _of_times(name))
+        return b"".join(_bytes(name, data[name]) for name in sorted(data.variables)) + repr(attributes).encode()
     return json.dumps(json.loads(path.read_text(encoding="utf-8")), sort_keys=True).encode()
 
 
 def _of_times(column):
-    return column.endswith("_s") or column == "machine"
+    return column.endswith("_s") or column in ("machine", "load_per_core")
 
 
 def _bytes(name, variable):

@@ -8,7 +8,8 @@ import xarray
 
 import softtact
 from softtact.errors import InputError
-from softtact.press.result import PressResult, read_press
+from softtact.files import read_dataset, write_dataset
+from softtact.press.result import PressResult, read_press, wall_time_s
 from softtact.readout.registry import labelled
 from softtact.readout.taxels import counts_of
 
@@ -45,6 +46,23 @@ def test_a_press_is_read_back_to_the_bit(tmp_path):
     written = made_up_press()
     written.write(tmp_path / "press.nc", settings={"a": 1}, seed=7)
     assert_same(read_press(tmp_path / "press.nc"), written)
+
+
+def test_two_runs_of_a_press_differ_in_an_attribute_of_their_files_alone(tmp_path):
+    one = made_up_press()
+    for name, result in (("one", one), ("other", replace(one, wall_time_s=2 * one.wall_time_s))):
+        result.write(tmp_path / f"{name}.nc")
+    one, other = (read_dataset(tmp_path / f"{name}.nc") for name in ("one", "other"))
+    assert (other.attrs.pop("wall_time_s") == 2 * one.attrs.pop("wall_time_s")).all() and one.identical(other)
+
+
+def test_wall_times_of_older_files_and_of_a_single_step_are_read(tmp_path):
+    data = made_up_press().to_dataset()
+    times = data.attrs.pop("wall_time_s")
+    assert (wall_time_s(data.assign(wall_time_s=("step", times))) == times).all()
+    assert np.isnan(wall_time_s(data)).all() and len(wall_time_s(data)) == 2
+    write_dataset(tmp_path / "one.nc", data.isel(step=[1]).assign_attrs(wall_time_s=times[1:]), seed=1, settings={})
+    assert (wall_time_s(read_dataset(tmp_path / "one.nc")) == times[1:]).all()
 
 
 def test_a_press_of_the_elastic_model_is_read_back_and_written_again_with_the_same_bytes(tmp_path):

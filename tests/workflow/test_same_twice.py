@@ -29,7 +29,7 @@ def test_one_and_two_cores_give_the_same_tables_and_maps(same_twice):
 def write_press(folder, *, seconds, deepest=0.3):
     (folder / "presses").mkdir(parents=True)
     maps = np.linspace(0, deepest, 24).reshape(1, 4, 6)
-    dataset = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), maps), "wall_time_s": ("step", [seconds])})
+    dataset = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), maps)}, attrs={"wall_time_s": [seconds]})
     dataset.to_netcdf(folder / "presses/a.nc", engine="h5netcdf")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.press.choice import INTERVALS, FoundationError, calibrate, cheapest, expected_errors, rms
+from softtact.press.result import wall_time_s
 
 if TYPE_CHECKING:
     import xarray
@@ -65,7 +66,7 @@ def _row(press, paper_choice, calibrated, height_mm):
     in_counts = _count_errors(press)
     for model in MODELS:
         row[f"{model}_error_mm"], row[f"{model}_error_counts"] = float(errors[model].max()), in_counts[model]
-        row[f"{model}_time_s"] = float(press[model].wall_time_s.sum())
+        row[f"{model}_time_s"] = float(wall_time_s(press[model]).sum())
     return row | {f"{model}_expected_mm": float(values.max()) for model, values in expected.items()}
 
 

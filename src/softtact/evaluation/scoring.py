@@ -16,6 +16,7 @@ from scipy import stats
 
 from softtact.learning.dataset import Samples, object_of
 from softtact.learning.network import predict
+from softtact.press.result import wall_time_s
 from softtact.readout.ssim import map_ssim, mean_absolute_counts, others_mean, own_range_ssim
 
 if TYPE_CHECKING:
@@ -192,7 +193,7 @@ def time_presses(presses: "Iterable[xarray.Dataset]", networks: "dict[str, torch
         for load_step, force in enumerate(press.normal_force_n.values):
             one = press.deformation_map_mm.values[load_step:load_step + 1]
             network_s = statistics.median(seconds(predict, network, one) for _ in range(repeats))
-            rows.append((*names, float(force), float(press.wall_time_s.values[load_step]), network_s))
+            rows.append((*names, float(force), float(wall_time_s(press)[load_step]), network_s))
     return pd.DataFrame(rows, columns=TIMING_COLUMNS)
 
 

@@ -42,6 +42,7 @@ def _array(units: str, *dimensions: str, coordinate: str | None = None) -> dict[
 
 
 _FACT = {"fact": True}      # a field that files hold as an attribute
+_WALL_TIME = "wall_time_s"     # in files an attribute, which no comparison of results counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +83,9 @@ class PressResult:
     """(step,) 1 where the solver reached its tolerance."""
     within_validity: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) 0 where the numbers are not to be relied on, for the `validity_reason`."""
-    wall_time_s: np.ndarray = field(metadata=_array("s", "step"))
-    """(step,) in s: wall time of the load step; the solver's preparation counts to the first."""
+    wall_time_s: np.ndarray
+    """(step,) in s: wall time of the load step; the solver's preparation counts to the first. Files hold it as an attribute, since
+    two runs of one press differ in it alone."""
     x_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "x", coordinate="x") | _PLANE)
     """(x,) in mm: the map's columns in the sensor frame."""
     y_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "y", coordinate="y") | _PLANE)
@@ -301,7 +303,7 @@ def _dataset_of(result: PressResult) -> "xarray.Dataset":
             variables["tactile_map"] = (_DIMENSIONS_OF_TAXELS, result.tactile_map, {"units": "counts"})
     if result.placed_object is not None:
         variables |= result.placed_object.variables()
-    attributes = {name: getattr(result, name) for name in _facts()} | result.attributes
+    attributes = {name: getattr(result, name) for name in (*_facts(), _WALL_TIME)} | result.attributes
     if result.solid is not None:
         variables |= _of_solid(result.solid)
         coordinates |= {"frame": np.array(result.solid.frames, dtype=str), "pair": np.array(result.solid.pairs, dtype=str),
@@ -368,11 +370,19 @@ def _press_of(path, data):
     values: dict[str, Any] = {one.name: data[_name(one)].values for one in needed}
     values |= {name: value.astype(str) for name, value in values.items() if value.dtype == object}     # texts
     attributes = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
-    values |= {name: attributes.pop(name) for name in _facts()}
+    attributes.pop(_WALL_TIME, None)
+    values |= {_WALL_TIME: wall_time_s(data)} | {name: attributes.pop(name) for name in _facts()}
     geometry, thickness = attributes.pop("geometry", "solid"), attributes.pop("mesh_thickness_mm", 1.0)
     attributes = {name: value for name, value in attributes.items() if name not in PROVENANCE}
     return PressResult(**values, readings=_readings_of(data), attributes=attributes, placed_object=PlacedObject.of(data),
                        solid=_solid_of(data, geometry, thickness) if "node_mm" in data else None)
+
+
+def wall_time_s(data: "xarray.Dataset") -> np.ndarray:
+    """Wall time (step,) in s of the load steps of a press' data set: its attribute, or the variable of older files; else nan."""
+    if _WALL_TIME in data:
+        return np.asarray(data[_WALL_TIME].values)
+    return np.atleast_1d(data.attrs.get(_WALL_TIME, np.full(data.sizes["step"], np.nan)))
 
 
 def _readings_of(data):

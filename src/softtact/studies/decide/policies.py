@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.press.choice import INTERVALS, cheapest, expected_errors
+from softtact.press.result import wall_time_s
 from softtact.sensors.frusta import SensorSpec
 from softtact.studies.decide.config import ELASTIC, FOUNDATION, HYPERELASTIC
 from softtact.studies.decide.scoring import COLUMNS, SCORES
@@ -30,7 +31,7 @@ def choice_table(facts: list[dict[str, Any]], presses: Mapping[str, list[Any]], 
         row = {"object": one["name"], "step_mm": one["step_mm"], "rule": rules[0],
                "share_hyperelastic": float(np.mean([model == HYPERELASTIC for model in rules])), "rules": " ".join(rules),
                "by_error": by_expected_error(own, spec, tolerance_mm)}
-        times = {f"time_{model}_s": float(np.nansum(own[model].wall_time_s)) for model in (ELASTIC, FOUNDATION, HYPERELASTIC)}
+        times = {f"time_{model}_s": float(np.nansum(wall_time_s(own[model]))) for model in (ELASTIC, FOUNDATION, HYPERELASTIC)}
         rows.append(row | times | {"load_per_core": float(own[HYPERELASTIC].attrs["load_per_core"])})
     return pd.DataFrame(rows)
 

@@ -13,7 +13,7 @@ from softtact.geometry.meshes import read_mesh
 from softtact.materials.config import law_from_printed
 from softtact.models.elastic.compliance import electrode_plane_compliance
 from softtact.models.hyperelastic.mesh_settings import frustum_scatter, mesh_settings, newton_settings
-from softtact.press.result import PressResult
+from softtact.press.result import PressResult, wall_time_s
 from softtact.press.sensor import Sensor, load_sensor
 from softtact.progress import announce
 from softtact.sensors.frusta import SensorSpec
@@ -82,5 +82,6 @@ def _with_all_steps(data, forces):
     whole = data.drop_vars("validity_reason").pad(step=(0, missing))
     reasons = [*data["validity_reason"].values, *["the load step was not reached"] * missing]
     flags = {name: ("step", np.pad(data[name].values, (0, missing)), data[name].attrs) for name in ("converged", "within_validity")}
+    whole = whole.assign_attrs(wall_time_s=np.pad(wall_time_s(data), (0, missing), constant_values=np.nan))
     return whole.assign(normal_force_n=("step", forces, data.normal_force_n.attrs),
                         validity_reason=("step", np.array(reasons, dtype=str), data.validity_reason.attrs), **flags)
