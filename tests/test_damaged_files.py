@@ -12,7 +12,7 @@ import pytest
 import xarray
 
 from softtact.errors import InputError
-from softtact.files import atomic_path, read_dataset, read_json, write_csv, write_dataset, write_json
+from softtact.files import atomic_path, read_csv, read_dataset, read_json, write_csv, write_dataset, write_json
 from softtact.models.elastic.compliance import Compliance
 from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.frustum_spring import FrustumLaw
@@ -86,3 +86,10 @@ def test_what_fails_while_it_is_written_leaves_the_old_file(tmp_path):
         temporary.write_text("half of the n")
         raise ZeroDivisionError
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("content", [b"", b"a,b\n1,2\n3,4,5\n", b"a,b\n\xff\xfe,2\n", b'a,b\n"1,2\n'])
+def test_a_damaged_table_of_a_study_is_refused_in_one_sentence(content, tmp_path):
+    (tmp_path / "scores.csv").write_bytes(content)
+    with pytest.raises(InputError, match=r"scores.csv: not a readable table \(.*\); take a copy of it, or make it again\.$"):
+        read_csv(tmp_path / "scores.csv")

@@ -208,6 +208,15 @@ def write_csv(path: str | Path, frame: "pd.DataFrame", *, float_format: str = "%
         frame.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
 
 
+def read_csv(path: str | Path, **options: Any) -> "pd.DataFrame":
+    """The table that `write_csv` wrote; options: of pandas.read_csv."""
+    import pandas
+
+    check_input(path, "archive")
+    with in_one_sentence(path, "not a readable table", _AGAIN):
+        return pandas.read_csv(path, **options)
+
+
 def write_dataset(path: str | Path, dataset: "xr.Dataset", *, seed: int | None, settings: Any) -> None:
     """Write an xarray dataset as NetCDF with version, settings digest and seed among its attributes.
 

@@ -47,12 +47,11 @@ def _run(opened, folder, workers, *, as_json):
     from softtact.robot.settings import import_mujoco
 
     import_mujoco()
-    import pandas as pd
-
+    from softtact.files import read_csv
     from softtact.studies.jobs import run_jobs
 
     run_jobs(opened.kind, opened.jobs(folder), folder, threads=workers, label=opened.name)
-    grasps, claims = pd.read_csv(folder / "grasps.csv"), pd.read_csv(folder / "tables/claims.csv")
+    grasps, claims = read_csv(folder / "grasps.csv"), read_csv(folder / "tables/claims.csv")
     failed = int((grasps.status != "done").sum())
     summary = {"grasps": len(grasps), "failed": failed, "report": str(folder / "report.html"),
                "claims": dict(zip(claims.claim, claims.verdict, strict=True))}

@@ -10,7 +10,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 import softtact
-from softtact.files import atomic_path
+from softtact.files import atomic_path, read_csv
 from softtact.reporting.run_record import machine
 from softtact.reporting.words import header
 
@@ -138,7 +138,7 @@ class Page:
         self.section("Tables")
         for name, title in titles.items():
             if name in files:
-                self.table(pd.read_csv(files[name]).iloc[:most_rows], title, file=files[name])
+                self.table(read_csv(files[name]).iloc[:most_rows], title, file=files[name])
 
     def claims(self, claims: pd.DataFrame, *, title: str = "The paper's claims", file: str | Path, links: Links = ()) -> None:
         """The section of a study's claims (see `evaluation.decisions`), coloured by verdict, with links to their evidence."""

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from softtact.files import read_csv
+
 COLUMNS = ["stage", "jobs", "total_s", "mean_s", "longest_s", "largest_memory_mb"]
 
 
@@ -50,7 +52,7 @@ def _read(path):
     """Seconds and memory of a benchmark. A very short job has no memory, and one killed while it wrote the file has no row."""
     if not path.stat().st_size:
         return pd.DataFrame({"s": [], "max_rss": []})
-    frame = pd.read_csv(path, sep="\t", na_values=["NA", "-"])
+    frame = read_csv(path, sep="\t", na_values=["NA", "-"])
     return pd.DataFrame({"s": frame["s"].astype(float), "max_rss": pd.to_numeric(frame.get("max_rss"), errors="coerce")})
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from softtact.evaluation.score_tables import ALL_FORCES, forces_of
-from softtact.files import read_json
+from softtact.files import read_csv, read_json
 from softtact.published.archive import MAPS_OF_SETS
 from softtact.reporting.page import Page
 from softtact.reporting.run_record import run_sentence
@@ -85,12 +85,12 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     page.box("What is synthetic here.", _synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings))
     page.text(_archive_facts(settings, archive) if archive else _facts(settings))
     if "gains" in inputs:
-        page.text(range_end_sentence(pd.read_csv(inputs["gains"]), settings["config"]))
+        page.text(range_end_sentence(read_csv(inputs["gains"]), settings["config"]))
     for text, anchor in (("Configuration", "config"), ("Code", "code")):
         page.other_page(text, f"{SOURCES_PAGE}#{anchor}")
     _show_figures(page, inputs["figures"], settings["sources"], {"fig5_ftir": ftir["verdict"]})
     _show_tables(page, inputs)
-    page.claims(pd.read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"],
+    page.claims(read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"],
                 links=[_code("softtact/studies/hybrid/claims/table.py")])
     page.section("What was run, on what, how long", anchor="run")
     page.text(run_sentence(run))
@@ -148,12 +148,12 @@ def _show_tables(page, inputs):
     page.text("Grasped objects: at the largest force, the paper's test 2, and over all forces. Skill is (score - best trivial) / "
               "(ceiling - best trivial) of the mean SSIM; below 0, that predictor reads better than the network. The file holds "
               "all sets and forces.")
-    page.table(result_table(pd.read_csv(inputs["scores"], dtype={"force": str})), file=inputs["scores"])
+    page.table(result_table(read_csv(inputs["scores"], dtype={"force": str})), file=inputs["scores"])
     page.section("Tables")
     for name, title in TITLES.items():
         if name in inputs:
             code = _code(f"softtact/studies/hybrid/stages/{_MODULE_OF.get(name, 'make_tables')}.py")
-            page.table(_in_words(pd.read_csv(inputs[name])), title, file=inputs[name], links=[code, _CONFIGURATION])
+            page.table(_in_words(read_csv(inputs[name])), title, file=inputs[name], links=[code, _CONFIGURATION])
 
 
 _CONFIGURATION = ("", [("Configuration", f"{SOURCES_PAGE}#config")])

@@ -4,11 +4,10 @@ import itertools
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.patches import Patch
 
 from softtact.evaluation.paired import compare
-from softtact.files import read_dataset
+from softtact.files import read_csv, read_dataset
 from softtact.reporting.style import colour, pyplot, save
 
 _FAMILY_COLOURS = {"elastic": colour("elastic"), "electrodes": "#b35806", "foundation": colour("foundation"),
@@ -43,7 +42,7 @@ def draw_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
     inputs: scores;  outputs: png, svg;  settings: seed
     """
-    scores = pd.read_csv(inputs["scores"])
+    scores = read_csv(inputs["scores"])
     truths, readouts = (list(dict.fromkeys(scores[name])) for name in ("truth", "readout"))
     models = list(dict.fromkeys(scores.model))
     figure = pyplot().figure(figsize=(2.9 * len(readouts) + 0.8, 2.1 * len(truths) + 0.4), layout="constrained")
@@ -79,7 +78,7 @@ def _bars(axes, rows, models, seed):
 
 def draw_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw the lower feature's share against step over indentation.  inputs: collapse;  outputs: png, svg."""
-    table = pd.read_csv(inputs["collapse"])
+    table = read_csv(inputs["collapse"])
     figure = pyplot().figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
     crosses = itertools.cycle(_CROSSES)
@@ -95,7 +94,7 @@ def draw_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 def draw_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw the learning curves of the compact network.  inputs: learning_curve;  outputs: png, svg."""
-    table = pd.read_csv(inputs["learning_curve"])
+    table = read_csv(inputs["learning_curve"])
     truths = list(dict.fromkeys(table.truth)) or [""]
     figure = pyplot().figure(figsize=(3.6 * len(truths) + 0.4, 3.2), layout="constrained")
     for axes, truth in zip(figure.subplots(1, len(truths), squeeze=False, sharey=True)[0], truths, strict=True):
@@ -111,7 +110,7 @@ def draw_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
 
 def draw_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw what the hyperelastic model errs less than both elastic ones, in each truth.  inputs: robustness;  outputs: png, svg."""
-    table = pd.read_csv(inputs["robustness"])
+    table = read_csv(inputs["robustness"])
     names = [f"{one.law.replace('_', ' ')}, K/mu {one.bulk_over_shear:g}, "
              f"tips {'bonded' if one.tips_bonded else 'free'}, {one.mesh}"
              for one in table.itertuples()]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from softtact.files import read_dataset, read_json, write_csv
+from softtact.files import read_csv, read_dataset, read_json, write_csv
 from softtact.sensors.frusta import SensorSpec
 from softtact.studies.decide.config import MODELS
 
@@ -49,10 +49,10 @@ def gather_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     presses = {model: [read_dataset(path) for path in inputs[f"presses_{model}"]] for model in MODELS}
     choices = choice_table([read_json(path) for path in inputs["facts"]], presses, SensorSpec.from_yaml(inputs["sensor"]),
                            tolerance_mm=settings["tolerance_mm"])
-    scores = pd.concat([pd.read_csv(path) for path in [*inputs["formulas"], *inputs["networks"]]], ignore_index=True)
+    scores = pd.concat([read_csv(path) for path in [*inputs["formulas"], *inputs["networks"]]], ignore_index=True)
     write_csv(outputs["scores"], pd.concat([scores, policy_scores(scores, choices)], ignore_index=True))
     write_csv(outputs["choices"], choices)
-    curves = pd.concat([pd.read_csv(path) for path in inputs["curves"]], ignore_index=True)
+    curves = pd.concat([read_csv(path) for path in inputs["curves"]], ignore_index=True)
     write_csv(outputs["learning_curve"], with_flatness(curves))
 
 
@@ -70,7 +70,7 @@ def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
     """Test the hypotheses.  inputs: scores, power, choices, collapse;  outputs: hypotheses;  settings: statistics, truths, seed."""
     from softtact.studies.decide.hypotheses import Tables, hypothesis_table
 
-    tables = Tables(**{name: pd.read_csv(inputs[name]) for name in ("scores", "choices", "collapse", "power")})
+    tables = Tables(**{name: read_csv(inputs[name]) for name in ("scores", "choices", "collapse", "power")})
     write_csv(outputs["hypotheses"], hypothesis_table(tables, statistics=settings["statistics"], truths=settings["truths"],
                                                       seed=settings["seed"]))
 
@@ -83,6 +83,6 @@ def judge_claims(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
     """
     from softtact.studies.decide.claims import claims_of_decision
 
-    tables = {name: pd.read_csv(path) for name, path in inputs.items()}
+    tables = {name: read_csv(path) for name, path in inputs.items()}
     write_csv(outputs["claims"], claims_of_decision(tables, statistics=settings["statistics"], truths=settings["truths"],
                                                     printed=settings["printed"]))

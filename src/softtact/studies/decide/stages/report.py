@@ -4,6 +4,7 @@ from typing import Any
 
 import pandas as pd
 
+from softtact.files import read_csv
 from softtact.reporting.page import Page
 
 CAPTIONS = {
@@ -26,7 +27,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     inputs: scores, hypotheses, learning_curve, power, robustness, collapse, claims (CSV), figures (list);  outputs: page
     settings: study, names (of the figures), shown (the object of the maps), config
     """
-    tables = {name: pd.read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items() if name != "figures"}
+    tables = {name: read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items() if name != "figures"}
     page = Page("Does the paper's claim hold? The study", settings["study"], folder=outputs["page"].parent)
     page.box("What is synthetic here.", "Truths are simulations with other laws, meshes and boundaries than the tested models; "
              "readings are the virtual sensor's. No score here is the paper's.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from softtact.files import read_dataset, write_csv
+from softtact.files import read_csv, read_dataset, write_csv
 from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:
@@ -86,13 +86,13 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     """Write the page.  inputs: table, claims, figures (list);  outputs: page;  settings: study, captions, config."""
     from softtact.reporting.page import Page
 
-    grasps = pd.read_csv(inputs["table"])
+    grasps = read_csv(inputs["table"])
     page = Page("Grasps by a robot: the study", settings["study"], folder=outputs["page"].parent)
     page.box("What is synthetic here.", "Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No "
              "score here is the paper's.")
     page.text(_result(grasps))
     page.figures(zip(inputs["figures"], settings["captions"], strict=True))
-    page.claims(pd.read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"])
+    page.claims(read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"])
     page.section("Grasps")
     page.table(grasps[[name for name in _SHOWN if name in grasps]], file=inputs["table"],
                links=[("Each grasp in time", [("grasps", "grasps")])])

@@ -8,10 +8,8 @@ settings: sensor, tolerances_mm
 from dataclasses import asdict
 from typing import Any
 
-import pandas as pd
-
 from softtact.evaluation.policies import CALIBRATION_SET, MODELS, expected_over_true, policy_table, press_table
-from softtact.files import read_dataset, write_csv, write_json
+from softtact.files import read_csv, read_dataset, write_csv, write_json
 from softtact.sensors.specification import SensorSpec
 
 
@@ -19,7 +17,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     """Calibrate on the indenters, and compare on all other sets."""
     paths = zip(*(inputs[model] for model in MODELS), strict=True)
     presses = [dict(zip(MODELS, map(read_dataset, three), strict=True)) for three in paths]
-    paper = pd.read_csv(inputs["complexity"]).set_index("object").model.to_dict()
+    paper = read_csv(inputs["complexity"]).set_index("object").model.to_dict()
     height = SensorSpec.from_dict(settings["sensor"]).dielectric.frusta.height_mm
     table, calibrated = press_table(presses, paper, height_mm=height)
     others = [name for name in table.set.unique() if name != CALIBRATION_SET] or [CALIBRATION_SET]

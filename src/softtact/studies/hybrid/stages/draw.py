@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from softtact.files import read_csv
+
 Named = dict[str, Any]
 _LIFTED_MM = 6.0     # of the object above the surface, so that its imprint is visible
 
@@ -78,7 +80,7 @@ def draw_fig4_complexity(*, inputs: Named, outputs: Named, settings: Named, thre
 
     placed = {entry["name"]: Placed(_placed(path, entry), tuple(settings["footprint_mm"]), settings["reach_mm"])
               for path, entry in zip(inputs["objects"], settings["objects"], strict=True)}
-    save(draw(pd.read_csv(inputs["complexity"]), placed, thresholds=settings["thresholds"]), outputs["png"], outputs["svg"])
+    save(draw(read_csv(inputs["complexity"]), placed, thresholds=settings["thresholds"]), outputs["png"], outputs["svg"])
 
 
 def draw_fig5_ftir(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
@@ -90,7 +92,7 @@ def draw_fig5_ftir(*, inputs: Named, outputs: Named, settings: Named, threads: i
     from softtact.reporting.style import save
     from softtact.studies.hybrid.figures.fig5_ftir import draw
 
-    figure = draw(pd.read_csv(inputs["area"]), read_json(inputs["summary"]), orientations=pd.read_csv(inputs["orientations"]))
+    figure = draw(read_csv(inputs["area"]), read_json(inputs["summary"]), orientations=read_csv(inputs["orientations"]))
     save(figure, outputs["png"], outputs["svg"])
 
 
@@ -103,7 +105,7 @@ def draw_fig6_ssim(*, inputs: Named, outputs: Named, settings: Named, threads: i
     from softtact.reporting.style import save
     from softtact.studies.hybrid.figures.fig6_ssim import draw
 
-    tables = (pd.read_csv(inputs[name]) for name in ("ssim", "ceiling", "baselines"))
+    tables = (read_csv(inputs[name]) for name in ("ssim", "ceiling", "baselines"))
     together = (table.assign(item=table["item"].map(object_of)) for table in tables)
     save(draw(*together, choices=settings["ssim"]), outputs["png"], outputs["svg"])
 
@@ -120,7 +122,7 @@ def draw_fig7_maps(*, inputs: Named, outputs: Named, settings: Named, threads: i
     from softtact.studies.hybrid.figures.fig7_maps import draw
 
     predictions = read_dataset(inputs["predictions"])
-    chosen = pd.read_csv(inputs["complexity"]).set_index("object").model
+    chosen = read_csv(inputs["complexity"]).set_index("object").model
     presses = {(press.attrs["item"], press.attrs["model"]): press for press in map(read_dataset, inputs["presses"])}
     objects = [_object(name, read_mesh(path, unit=unit), chosen[name], presses, predictions) | {"trials": trials}
                for path, (name, unit), trials in zip(inputs["objects"], settings["units"], settings["trials"], strict=True)]
@@ -135,7 +137,7 @@ def draw_fig8_policies(*, inputs: Named, outputs: Named, settings: Named, thread
     from softtact.reporting.style import save
     from softtact.studies.hybrid.figures.fig8_policies import draw
 
-    save(draw(pd.read_csv(inputs["policies"]), pd.read_csv(inputs["presses"])), outputs["png"], outputs["svg"])
+    save(draw(read_csv(inputs["policies"]), read_csv(inputs["presses"])), outputs["png"], outputs["svg"])
 
 
 def draw_fig9_networks(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
@@ -146,9 +148,9 @@ def draw_fig9_networks(*, inputs: Named, outputs: Named, settings: Named, thread
     from softtact.reporting.style import save
     from softtact.studies.hybrid.figures.fig9_networks import draw
 
-    networks = pd.read_csv(inputs["networks"])
+    networks = read_csv(inputs["networks"])
     kinds = list(networks.groupby(["model", "architecture"], sort=False).groups)
-    histories = dict(zip(kinds, map(pd.read_csv, inputs["histories"]), strict=True))
+    histories = dict(zip(kinds, map(read_csv, inputs["histories"]), strict=True))
     save(draw(networks, histories, choices=settings["ssim"]), outputs["png"], outputs["svg"])
 
 
@@ -160,8 +162,8 @@ def draw_fig10_learning_curve(*, inputs: Named, outputs: Named, settings: Named,
     from softtact.reporting.style import save
     from softtact.studies.hybrid.figures.fig10_learning_curve import draw
 
-    curves = pd.concat(map(pd.read_csv, inputs["curves"]))
-    save(draw(curves, pd.read_csv(inputs["ceiling"])), outputs["png"], outputs["svg"])
+    curves = pd.concat(map(read_csv, inputs["curves"]))
+    save(draw(curves, read_csv(inputs["ceiling"])), outputs["png"], outputs["svg"])
 
 
 def _outline(mesh, y, depth):

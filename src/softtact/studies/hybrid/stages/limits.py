@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 
 from softtact.evaluation.limits import gain_table, limits
-from softtact.files import read_dataset, write_csv
+from softtact.files import read_csv, read_dataset, write_csv
 from softtact.learning.settings import Ssim
 from softtact.readout.virtual_sensor import VirtualSensorSettings
 from softtact.sensors.specification import SensorSpec
@@ -17,7 +17,7 @@ def find_limits(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     inputs: curves (list of learning_curve.csv), networks (CSV);  outputs: limits
     settings: architecture, tested, reference (names of models), source (of the readings)
     """
-    write_csv(outputs["limits"], limits(pd.concat(map(pd.read_csv, inputs["curves"])), pd.read_csv(inputs["networks"]), **settings))
+    write_csv(outputs["limits"], limits(pd.concat(map(read_csv, inputs["curves"])), read_csv(inputs["networks"]), **settings))
 
 
 def compare_gains(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

@@ -9,9 +9,7 @@ settings: rule, thresholds {total, overlap}, source (of the readings), models (o
 
 from typing import Any
 
-import pandas as pd
-
-from softtact.files import read_dataset, read_json, write_csv
+from softtact.files import read_csv, read_dataset, read_json, write_csv
 from softtact.geometry.complexity import choose_model
 from softtact.learning.dataset import object_of
 from softtact.studies.hybrid.claims.table import Evidence, claims
@@ -28,7 +26,7 @@ from softtact.studies.hybrid.tables import (
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Read the study's results and write its tables."""
     cards = [read_json(path) for path in inputs["cards"]]
-    complexity, ssim, timing = (pd.read_csv(inputs[name]) for name in ("complexity", "ssim", "timing"))
+    complexity, ssim, timing = (read_csv(inputs[name]) for name in ("complexity", "ssim", "timing"))
 
     def choose(*counts, rule=settings["rule"]):
         return choose_model(*counts, rule=rule, **settings["thresholds"])
@@ -39,7 +37,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     write_csv(outputs["contradictions"], contradictions(cards))
     write_csv(outputs["table2"], table2_complexity(complexity, choose))
     write_csv(outputs["table3"], table3_timing(timing))
-    scores = {name: pd.read_csv(inputs[name]) for name in ("summary", "per_item", "ceiling", "features", "scores", "taxels")
+    scores = {name: read_csv(inputs[name]) for name in ("summary", "per_item", "ceiling", "features", "scores", "taxels")
               if name in inputs}
     searches = dict(zip(settings["models"], map(read_json, inputs["searches"]), strict=True))
     write_csv(outputs["claims"], claims(Evidence(

@@ -7,7 +7,7 @@ import pandas as pd
 
 from softtact.evaluation import retraining
 from softtact.evaluation.retraining import SEEDS_COLUMNS, SIZES_COLUMNS, Experiment
-from softtact.files import read_json, write_csv
+from softtact.files import read_csv, read_json, write_csv
 from softtact.learning.dataset import TESTS, read_samples
 from softtact.learning.settings import (
     LearningCurve,
@@ -58,7 +58,7 @@ def gather_seeds(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 
     inputs: seeds (list of seeds.csv, one of each model);  outputs: table (CSV)
     """
-    write_csv(outputs["table"], retraining.spread_of_seeds(pd.concat(map(pd.read_csv, inputs["seeds"]))))
+    write_csv(outputs["table"], retraining.spread_of_seeds(pd.concat(map(read_csv, inputs["seeds"]))))
 
 
 def _of_networks(train: Callable[[Experiment], pd.DataFrame], networks: Sequence[str], inputs: dict[str, Any],

@@ -12,7 +12,7 @@ import pandas as pd
 
 from softtact.errors import InputError
 from softtact.evaluation.curve_shape import PAPER_RMSE_MM2, judge, summary_sentence
-from softtact.files import read_dataset, write_csv, write_json
+from softtact.files import read_csv, read_dataset, write_csv, write_json
 from softtact.tables import read_table
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def _curves(inputs, state, virtual, count):
     forces = state.force_n.values
     model = state.area_per_frustum_mm2.sel(orientation=state.attrs["orientation_under_test"],
                                            law=state.attrs["law_under_test"]).values
-    discs = pd.concat([pd.read_csv(path) for path in inputs["discs"]])
+    discs = pd.concat([read_csv(path) for path in inputs["discs"]])
     image = discs.groupby("force_n").area_mm2.sum().reindex(forces, fill_value=0.0).to_numpy() / count
     measured, source = _measured(inputs.get("measured"), forces, virtual)
     table = pd.DataFrame({"force_n": forces, "area_per_frustum_mm2": model, "area_image_mm2": image, "area_measured_mm2": measured,

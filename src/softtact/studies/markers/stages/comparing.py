@@ -17,7 +17,7 @@ import pandas as pd
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
 from softtact.evaluation.image_scores import motion_error_px, position_error_px
-from softtact.files import write_csv
+from softtact.files import read_csv, write_csv
 from softtact.studies.markers.paths import pose_on_sensor
 from softtact.studies.markers.pressing import deepest_mm, rest_readings
 from softtact.studies.markers.stages.data import sensor_with
@@ -60,7 +60,7 @@ def compare_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings
 def read_markers(path: str | Path, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(places, places at rest), each (marker, 2) in px, of a CSV; without the latter in it, those of the sensor, `rest`."""
     try:
-        table = pd.read_csv(path)
+        table = read_csv(path)
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file.") from None
     if missing := [name for name in _NOW if name not in table]:

@@ -3,9 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
-from softtact.files import atomic_path, read_dataset
+from softtact.files import atomic_path, read_csv, read_dataset
 from softtact.reporting.style import pyplot, save
 from softtact.studies.markers.claims import WORDS
 from softtact.studies.markers.drag import DragSequence, drag_fragment
@@ -82,7 +81,7 @@ def draw_likeness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 
 def _draw_scores(inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], score: str) -> None:
-    plt, rows = pyplot(), pd.read_csv(inputs["scores"])
+    plt, rows = pyplot(), read_csv(inputs["scores"])
     label = {"d_px": "d, px", "mse": "MSE outside the markers, grey levels²"}[score]
     sources = [name for name in settings["sources"] if rows.loc[rows.source == name, score].notna().any()]
     figure, (bars, down, aside) = plt.subplots(1, 3, figsize=(12, 3.6), width_ratios=(2.4, 1, 1), layout="constrained")
@@ -123,7 +122,7 @@ def draw_sliding(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 
     inputs: verdicts (CSV);  settings: sources
     """
-    plt, table = pyplot(), pd.read_csv(inputs["verdicts"])
+    plt, table = pyplot(), read_csv(inputs["verdicts"])
     sources = [name for name in settings["sources"] if name in set(table.source)]
     names = list(dict.fromkeys(table.object))
     figure, axes = plt.subplots(
@@ -152,7 +151,7 @@ def draw_training(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     plt = pyplot()
     figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
     for file in inputs["histories"]:
-        one = pd.read_csv(file)
+        one = read_csv(file)
         name = str(one.network.iloc[0])
         for place, column in zip(axes, ("l1", "adversarial", "discriminator"), strict=True):
             place.plot(one.epoch, one[column], color=COLOURS[name], label=WORDS[name] if one.seed.iloc[0] == 0 else None)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.files import read_json, write_csv
+from softtact.files import read_csv, read_json, write_csv
 from softtact.reporting.page import Page
 from softtact.studies.markers.claims import PRINTED_IMAGES, PRINTED_MARKERS, WORDS, claims_of_markers
 from softtact.studies.markers.judging import by_motion, by_object, sliding_verdicts
@@ -30,8 +30,8 @@ def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
     outputs: scores, table1, table2, by_object, by_motion, sliding, claims (CSV)
     settings: sources (in their order), trained (objects), networks
     """
-    rows = pd.concat([pd.read_csv(file) for file in inputs["scores"]], ignore_index=True)
-    verdicts = sliding_verdicts(pd.read_csv(inputs["sliding"]), settings["trained"])
+    rows = pd.concat([read_csv(file) for file in inputs["scores"]], ignore_index=True)
+    verdicts = sliding_verdicts(read_csv(inputs["sliding"]), settings["trained"])
     write_csv(outputs["scores"], rows)
     write_csv(
         outputs["table1"], _beside(table_one(rows, settings["sources"]), PRINTED_MARKERS, ("d_px", "e_px", "degenerate_percent"))
@@ -76,7 +76,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     outputs: page;  settings: study, size, pixels, friction (words), config
     """
     tables = {
-        name: pd.read_csv(inputs[name], keep_default_na=name != "claims")
+        name: read_csv(inputs[name], keep_default_na=name != "claims")
         for name in ("table1", "table2", "by_object", "sliding", "claims", "manifest")
     }
     facts = read_json(inputs["facts"])

@@ -7,11 +7,10 @@ from typing import Any
 
 import matplotlib.tri as mtri
 import numpy as np
-import pandas as pd
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from softtact.fem.solid_mesh import SolidMesh
-from softtact.files import read_dataset
+from softtact.files import read_csv, read_dataset
 from softtact.probe.design import PalpationDesign
 from softtact.probe.structure import structure_mesh
 from softtact.probe.sweep import Palpation, verdict
@@ -90,7 +89,7 @@ def draw_curves(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
     inputs: sweeps, slopes (CSV)
     """
-    plt, sweeps, slopes = pyplot(), _sweeps(inputs), pd.read_csv(inputs["slopes"])
+    plt, sweeps, slopes = pyplot(), _sweeps(inputs), read_csv(inputs["slopes"])
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
     tissues = list(dict.fromkeys(sweep.tissue for sweep in sweeps))
     for sweep in sweeps:
@@ -130,7 +129,7 @@ def draw_films(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
 
 def draw_hardness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """The paper's relative hardness and the apparent modulus against load, for each tissue and height.  inputs: table (CSV)."""
-    plt, table = pyplot(), pd.read_csv(inputs["table"])
+    plt, table = pyplot(), read_csv(inputs["table"])
     figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
     titles = {"relative_hardness_n_mm": "F/d of the beam, N/mm", "apparent_modulus_mpa": "apparent modulus at rest, MPa"}
     tissues, styles = list(dict.fromkeys(table.tissue)), ("-", "--", ":", "-.")
@@ -151,7 +150,7 @@ def draw_hardness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 def draw_lump(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Where a lump is detected, and estimates of hidden lumps with 95 % intervals.  inputs: detection, recovery (CSV)."""
-    plt, detection, recovered = pyplot(), pd.read_csv(inputs["detection"]), pd.read_csv(inputs["recovery"])
+    plt, detection, recovered = pyplot(), read_csv(inputs["detection"]), read_csv(inputs["recovery"])
     figure, (left, *others) = plt.subplots(1, 4, figsize=(13, 3.2), layout="constrained", width_ratios=(1.6, 1, 1, 1))
     grid = detection.pivot(index="depth_mm", columns="x_mm", values="least_stiffness_ratio")
     seen = np.ma.masked_invalid(grid.to_numpy())

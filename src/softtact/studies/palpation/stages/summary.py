@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
-from softtact.files import digest, read_json, write_json
+from softtact.files import digest, read_csv, read_json, write_json
 from softtact.probe.design import PalpationDesign
 from softtact.studies.palpation.claims import NOT_JUDGED
 
@@ -53,7 +51,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
 
 def _show_claims(page: "Page", file: Path) -> None:
     """The section of the paper's claims; of a user's tissues a sentence that none is judged."""
-    claims = pd.read_csv(file, keep_default_na=False)
+    claims = read_csv(file, keep_default_na=False)
     if len(claims):
         page.claims(claims, file=file)
         return

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from softtact.files import atomic_path, read_dataset, write_csv, write_dataset, write_json
+from softtact.files import atomic_path, read_csv, read_dataset, write_csv, write_dataset, write_json
 from softtact.probe.design import PalpationDesign
 from softtact.probe.structure import structure_mesh
 from softtact.probe.sweep import Palpation, hardness_table, palpate, slope, verdict
@@ -54,7 +54,7 @@ def tabulate(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[
     moved, coarse = (pd.DataFrame(map(_slope_row, kept)) for kept in (
         [one for one in sweeps if one.scenario == "displacement"], map(_sweep, inputs["coarse"])))
     mesh_error = float((coarse.line_n_mm / moved.line_n_mm - 1).abs().max())
-    hardness = pd.concat([pd.read_csv(path, float_precision="round_trip") for path in inputs.get("hardness", [])]
+    hardness = pd.concat([read_csv(path, float_precision="round_trip") for path in inputs.get("hardness", [])]
                          or [pd.DataFrame()], ignore_index=True)
     claims = claims_of_probe(curves, slopes, hardness if len(hardness) else None, mesh_error=mesh_error)
     variants = [one | _slope_row(_sweep(path)) for one, path in zip(settings["variants"], inputs.get("variants", []), strict=True)]

@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from softtact.files import read_arrays
+from softtact.files import read_arrays, read_csv
 from softtact.reporting.style import pyplot, save
 from softtact.studies.real.paths import read_path
 from softtact.studies.real.stages.force import ELASTIC, elastic_path
@@ -20,7 +19,7 @@ def draw_gel_force(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     """Draw force over depth, each variant with one modulus for all points.  inputs: table, path_VARIANT;  outputs: png, svg;
     settings: gel_force
     """
-    table, values = pd.read_csv(inputs["table"]), settings["gel_force"]
+    table, values = read_csv(inputs["table"]), settings["gel_force"]
     figure = pyplot().figure(figsize=(7.2, 3.2), layout="constrained")
     curve, error = figure.subplots(1, 2)
     names = [*values["variants"], ELASTIC]
@@ -48,7 +47,7 @@ def _force_path(name, inputs, values):
 
 def draw_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw the measured and the predicted motion of the markers, enlarged.  inputs: motion (CSV);  outputs: png, svg"""
-    table = pd.read_csv(inputs["motion"])
+    table = read_csv(inputs["motion"])
     models = [name for name in (PHYSICS, FORMULAS, LAYER) if f"{name} x_px" in table]
     figure = pyplot().figure(figsize=(3.3 * len(models), 3.2), layout="constrained")
     for axes, model in zip(figure.subplots(1, len(models), sharey=True, squeeze=False)[0], models, strict=True):
@@ -96,7 +95,7 @@ def draw_shading(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
 
 def draw_ball_size(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw the error of the colours over the ball's assumed radius.  inputs: table;  outputs: png, svg"""
-    table = pd.read_csv(inputs["table"])
+    table = read_csv(inputs["table"])
     sets = list(dict.fromkeys(table.set))
     figure = pyplot().figure(figsize=(3.0 * len(sets), 2.8), layout="constrained")
     for axes, name in zip(figure.subplots(1, len(sets), squeeze=False)[0], sets, strict=True):

@@ -11,7 +11,7 @@ import pandas as pd
 from PIL import Image
 
 from softtact.errors import InputError
-from softtact.files import atomic_path, write_csv, write_json
+from softtact.files import atomic_path, read_csv, write_csv, write_json
 from softtact.imaging.ball_presses import BallPress, Gel
 from softtact.imaging.marker_motion import COLUMNS, MarkerMotion
 from softtact.imaging.shading import PhongShading
@@ -47,7 +47,7 @@ def gather_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     path = Path(settings["file"])
     path = path if path.exists() else gel_data(settings["data"], settings["file"])
     MarkerMotion.read(path)
-    write_csv(outputs["markers"], pd.read_csv(path)[list(COLUMNS)])
+    write_csv(outputs["markers"], read_csv(path)[list(COLUMNS)])
 
 
 def _of_wheel(name, folder):
@@ -83,7 +83,7 @@ def _wheel(folder):
 
 def _of_fots(folder):
     """Presses of FOTS; its background has blue and red swapped against its images."""
-    table = pd.read_csv(gel_data(folder, "fots/presses.csv"))
+    table = read_csv(gel_data(folder, "fots/presses.csv"))
     images = np.stack([np.asarray(Image.open(gel_data(folder, f"fots/presses/{name}"))) for name in table.image])
     background = np.load(gel_data(folder, "fots/background.npy"), allow_pickle=False)
     middle = np.median(images, axis=0)

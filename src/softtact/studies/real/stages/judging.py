@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.files import read_json, write_csv
+from softtact.files import read_csv, read_json, write_csv
 from softtact.reporting.page import Page
 from softtact.studies.real.claims import claims_of_real
 
@@ -21,7 +21,7 @@ _CAPTIONS = {
 
 def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the table of claims.  inputs: the tables (CSV);  outputs: claims;  settings: of `claims_of_real`"""
-    tables = {name: pd.read_csv(path) for name, path in inputs.items()}
+    tables = {name: read_csv(path) for name, path in inputs.items()}
     write_csv(outputs["claims"], claims_of_real(tables, **settings))
 
 
@@ -29,7 +29,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     """Write the page.  inputs: the tables, claims (CSV), figures, facts (lists), gel (JSON);  outputs: page;
     settings: study, names (of the figures), config
     """
-    tables = {name: pd.read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items()
+    tables = {name: read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items()
               if name not in ("figures", "facts", "gel")}
     facts, gel = [read_json(path) for path in inputs["facts"]], read_json(inputs["gel"])
     page = Page("Gels with a camera on measured data", settings["study"], folder=outputs["page"].parent)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.evaluation.image_scores import image_scores
-from softtact.files import atomic_path, write_csv
+from softtact.files import atomic_path, read_csv, write_csv
 from softtact.imaging.ball_presses import Gel
 from softtact.progress import Watch
 from softtact.studies.real.labelled import (
@@ -60,7 +60,7 @@ def fit_shading(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 def gather_tables(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Join the tables of all sets.  inputs: shading, ball (lists of CSV);  outputs: shading, ball_size (CSV);  settings: sets"""
     for name, output in (("shading", "shading"), ("ball", "ball_size")):
-        write_csv(outputs[output], pd.concat([pd.read_csv(path) for path in inputs[name]], ignore_index=True))
+        write_csv(outputs[output], pd.concat([read_csv(path) for path in inputs[name]], ignore_index=True))
 
 
 def _reach(own, presses, numbers):

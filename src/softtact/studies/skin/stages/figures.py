@@ -6,9 +6,8 @@ Outputs of each are png and svg; for the link only png.
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from softtact.files import read_dataset
+from softtact.files import read_csv, read_dataset
 from softtact.reporting.style import pyplot, save
 from softtact.studies.skin.settings import design_of
 
@@ -22,7 +21,7 @@ def draw_load(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     inputs: readings (NetCDF), table (CSV);  settings: module, patch, load (its number), elastomer
     """
     number, layout = settings["load"] - 1, design_of(settings).layout()
-    readings, row = read_dataset(inputs["readings"]).isel(load=number), pd.read_csv(inputs["table"]).iloc[number]
+    readings, row = read_dataset(inputs["readings"]).isel(load=number), read_csv(inputs["table"]).iloc[number]
     figure, (left, right) = pyplot().subplots(1, 2, figsize=(9, 4.2), layout="constrained")
     down = -readings.displacement_mm.values[:, 2]
     shown = left.tricontourf(*readings.node_mm.values.T, down, levels=20, cmap="viridis")
@@ -44,7 +43,7 @@ def draw_probes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
     inputs: table (CSV). Dotted: the elastomer's curve is extrapolated.
     """
-    plt, table = pyplot(), pd.read_csv(inputs["table"])
+    plt, table = pyplot(), read_csv(inputs["table"])
     diameters = sorted(set(table.diameter_mm))
     figure, panels = plt.subplots(
         1, len(diameters), figsize=(2.6 * len(diameters) + 1, 3), layout="constrained", sharey=True, squeeze=False
@@ -68,7 +67,7 @@ def draw_front(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
 
     inputs: choice_printed, front_confidence (CSV)
     """
-    table, confidence = pd.read_csv(inputs["choice_printed"]), pd.read_csv(inputs["front_confidence"])
+    table, confidence = read_csv(inputs["choice_printed"]), read_csv(inputs["front_confidence"])
     figure, (left, right) = pyplot().subplots(1, 2, figsize=(9.5, 4), layout="constrained")
     left.plot(table.weight_g_module, table.sensitivity_per_kpa, "o", color="0.3")
     front = table[table.on_front]
@@ -107,7 +106,7 @@ def draw_thickness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
     inputs: thickness (CSV);  settings: detected_counts, strain_limit
     """
-    plt, table = pyplot(), pd.read_csv(inputs["thickness"])
+    plt, table = pyplot(), read_csv(inputs["thickness"])
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.6), layout="constrained")
     for colour, (name, rows) in zip(plt.get_cmap("tab10").colors, table.groupby("elastomer", sort=False), strict=False):
         left.loglog(rows.thickness_mm, rows.counts_at_smallest_force, ".-", color=colour)
@@ -133,7 +132,7 @@ def draw_maps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
 
     inputs: detection, crosstalk (CSV);  settings: module, patch, force_n (of the finger)
     """
-    maps, crosstalk, layout = pd.read_csv(inputs["detection"]), pd.read_csv(inputs["crosstalk"]), design_of(settings).layout()
+    maps, crosstalk, layout = read_csv(inputs["detection"]), read_csv(inputs["crosstalk"]), design_of(settings).layout()
     places = maps[["x_mm", "y_mm"]].to_numpy(dtype=float)
     figure, (one, two, three) = pyplot().subplots(1, 3, figsize=(13, 3.9), layout="constrained")
     for axes, values, label in (

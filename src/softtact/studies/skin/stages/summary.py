@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import yaml
 
-from softtact.files import read_json, write_csv, write_json
+from softtact.files import read_csv, read_json, write_csv, write_json
 from softtact.skin.design import SkinDesign
 
 _CAPTIONS = {
@@ -58,11 +57,11 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.text(_facts(design))
     page.box("Read with care.", facts["remarks"])
     page.box("", _result(design, facts))
-    loads = pd.read_csv(files["loads"])
+    loads = read_csv(files["loads"])
     page.figures((path, _caption(path, loads)) for path in inputs["figures"])
     page.tables(_TITLES, files, most_rows=_MOST_ROWS)
     if "claims" in files:
-        page.claims(pd.read_csv(files["claims"], keep_default_na=False), title="The papers' claims", file=files["claims"])
+        page.claims(read_csv(files["claims"], keep_default_na=False), title="The papers' claims", file=files["claims"])
     page.section("Files")
     page.text("Arrays with units, and the taxels for other programs.",
               links=[("", [(path.name, page.link(path)) for path in (inputs["readings"], *inputs["exports"])])])
