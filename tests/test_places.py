@@ -163,3 +163,18 @@ def test_a_name_of_the_longest_kind_can_be_written(tmp_path):
     with atomic_path(path) as temporary:
         np.savez(temporary, x=np.zeros(3))
     assert path.exists()
+
+
+def test_where_kernels_can_be_kept_nowhere_they_go_to_a_temporary_folder_with_a_word(tmp_path, monkeypatch, capsys):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(outputs.os, "access", lambda *_: False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    with outputs.place_for_kernels():
+        assert "NUMBA_CACHE_DIR" not in os.environ
+    (tmp_path / "file").write_text("where the cache's folder should be")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with outputs.place_for_kernels():
+        folder = Path(os.environ["NUMBA_CACHE_DIR"])
+        assert folder.is_dir()
+    assert "NUMBA_CACHE_DIR" not in os.environ and not folder.exists()
+    assert capsys.readouterr().err.count("WARNING: Compiled kernels can be kept neither") == 1

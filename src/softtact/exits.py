@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 
 from softtact.errors import SofttactError, missing_extra
+from softtact.outputs import place_for_kernels
 from softtact.processes import Terminated, sigterm_interrupts
 
 EXIT_STATUS = {0: "done",
@@ -22,7 +23,7 @@ _NO_MEMORY = "there is not enough memory{}; use a coarser mesh, fewer presses at
 def run_to_status(name: str, action: Callable[[], None]) -> int:
     """Run `action` with SIGTERM as an interrupt; return its exit status after its sentence, which begins with `name`."""
     try:
-        with sigterm_interrupts():
+        with sigterm_interrupts(), place_for_kernels():
             action()
         return 0
     except BrokenPipeError:     # `| head` has closed the pipe; the rest of the buffer must not raise at the end

@@ -18,10 +18,12 @@ from pathlib import Path
 
 from softtact.errors import InputError, OutputError
 from softtact.inputs import no_name
+from softtact.progress import announce
 
 _OURS = re.compile(r"\.?softtact-([0-9a-f]{8})-(\d+)-.*")     # machine, process
 _LONGEST_NAME = 255      # bytes, on the file systems in use
 _LONGEST_ENDING = 20     # characters; longer ones are no file's kind, and would make a temporary name too long
+_NUMBA = "NUMBA_CACHE_DIR"
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)     # errors of a file that is being written
 
 
@@ -138,6 +140,35 @@ def temporary_folder(within: str | Path | None = None) -> Iterator[Path]:
     _delete_left(place)
     with tempfile.TemporaryDirectory(prefix=f"{'.' if within else ''}{_prefix()}", dir=place, ignore_cleanup_errors=True) as folder:
         yield Path(folder)
+
+
+@contextlib.contextmanager
+def place_for_kernels() -> Iterator[None]:
+    """A block in which Numba can keep compiled kernels: in a temporary folder if nowhere else, where it would refuse to compile.
+
+    Numba looks beside the package, then in the user's cache. It reads the environment when it is imported.
+    """
+    if _NUMBA in os.environ or os.access(Path(__file__).parent, os.W_OK) or _can_be_written("numba"):
+        yield
+        return
+    announce("WARNING: Compiled kernels can be kept neither beside softtact nor in the user's cache, so each run compiles them; "
+             f"set {_NUMBA} to a folder in which files can be written.")
+    with temporary_folder() as folder:
+        os.environ[_NUMBA] = str(folder)
+        try:
+            yield
+        finally:
+            del os.environ[_NUMBA]
+
+
+def _can_be_written(name):
+    """Whether a file can be made in a folder of the user's cache."""
+    with contextlib.suppress(OSError, OutputError):
+        folder = cache_folder().with_name(name)
+        folder.mkdir(parents=True, exist_ok=True)
+        os.unlink(temporary_file(folder, ""))
+        return True
+    return False
 
 
 def _prefix():
