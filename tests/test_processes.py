@@ -38,6 +38,15 @@ run_tied([sys.executable, "-c", "import os, time; os.write({{fd}}, b'began began
 """
 
 
+STAGE = f"""
+import os, subprocess, sys
+stage = "import os, time; from softtact.studies import __main__ as runner; runner.run_stage = lambda options: [" \\
+    "os.write({{fd}}, b'began began '), time.sleep({OUTLIVED_S}), os.write({{fd}}, b'outlived')]; runner.main(['any'])"
+os.environ["SOFTTACT_WORKFLOW"] = str(os.getpid())
+subprocess.run(["sh", "-c", '"$0" -c "$1"; true', sys.executable, stage], pass_fds=[{{fd}}], stderr=subprocess.DEVNULL)
+"""
+
+
 def read_to_the_end(reader):
     return b"".join(iter(lambda: os.read(reader, 100), b""))
 
@@ -63,8 +72,8 @@ def said_after(number, script, pipe):
     return read_to_the_end(reader), script.wait()
 
 
-@pytest.mark.parametrize("script", [PARENT, PARENT.replace("def work", "sys.platform = 'elsewhere'\ndef work"), TIED],
-                         ids=["workers", "workers without prctl", "another program"])
+@pytest.mark.parametrize("script", [PARENT, PARENT.replace("def work", "sys.platform = 'elsewhere'\ndef work"), TIED,
+                                    STAGE], ids=["workers", "workers without prctl", "another program", "stage of a workflow"])
 def test_processes_end_with_a_parent_that_is_killed(script, pipe):
     assert said_after(signal.SIGKILL, script, pipe) == (b"", -signal.SIGKILL)
 

@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import multiprocessing
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -59,6 +60,18 @@ def _look_for(parent):
     while os.getppid() == parent:
         time.sleep(_LOOK_EVERY_S)
     os._exit(1)
+
+
+def end_after(other: int) -> None:
+    """Let this process get SIGTERM when another one, such as its parent's parent, has ended (on Linux)."""
+    if hasattr(os, "pidfd_open"):
+        with contextlib.suppress(OSError):     # its number is one of another container
+            threading.Thread(target=_wait_for, args=(os.pidfd_open(other),), daemon=True).start()
+
+
+def _wait_for(handle):
+    select.select([handle], [], [])
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def run_tied(command: Sequence[str], **options: Any) -> subprocess.CompletedProcess:

@@ -31,6 +31,7 @@ if not _there.is_dir() or not os.access(_there, os.W_OK):
 # run anything again.
 os.environ["SOFTTACT_PYTHON"] = sys.executable
 os.environ.setdefault("SOFTTACT_RUNNER", "-m softtact.studies")
+os.environ["SOFTTACT_WORKFLOW"] = str(os.getpid())  # a stage ends with this process, also if it is killed
 
 
 def code(stage):

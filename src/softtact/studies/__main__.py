@@ -5,17 +5,21 @@ Example:
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from softtact.errors import InputError
 from softtact.exits import run_to_status
+from softtact.processes import end_after
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the stage that the command line names; return its exit status."""
     options = add_arguments(argparse.ArgumentParser(prog="softtact stage", description=__doc__)).parse_args(arguments)
+    if workflow := os.environ.get("SOFTTACT_WORKFLOW"):     # Snakemake, which a shell stands between
+        end_after(int(workflow))
     return run_to_status(f"softtact {options.stage}", lambda: run_stage(options))
 
 
