@@ -33,7 +33,7 @@ from softtact.errors import InputError, OutputError, SofttactError
 from softtact.files import atomic_path, digest, new_hdf5, wait_for_disk, write_dataset
 from softtact.geometry.pose import Pose, draw_poses
 from softtact.learning.press_blocks import BLOCK, PressBlocks
-from softtact.outputs import held, target_of
+from softtact.outputs import held, not_written, target_of
 from softtact.progress import progress
 
 if TYPE_CHECKING:
@@ -179,8 +179,12 @@ def _finish(part, path, form, plan, blocks):
     whole = part / f"whole{path.suffix}"
     (_write_netcdf if form == "netcdf" else _write_hdf5)(whole, rows, form, plan, blocks)
     _refuse_other_rows(whole, rows, form, plan, blocks)
-    os.replace(whole, path)
-    wait_for_disk(path.parent)
+    try:
+        wait_for_disk(whole)
+        os.replace(whole, path)
+        wait_for_disk(path.parent)
+    except OSError as error:
+        raise not_written(path, error) from None
     return failed
 
 
@@ -235,7 +239,7 @@ def _unit(name):
 
 
 def _write_hdf5(path, rows, form, plan, blocks):
-    with atomic_path(path, durable=True) as temporary, new_hdf5(temporary) as file:
+    with atomic_path(path) as temporary, new_hdf5(temporary) as file:
         for part, arrays in _rows(form, plan, blocks):
             for name, values in arrays.items():
                 if name not in file:
