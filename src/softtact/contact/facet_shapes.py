@@ -8,7 +8,8 @@ do not depend on it.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from softtact.compiled import compiled
 
 MOST_NODES = 9
 TRI3, TRI6, QUAD8, QUAD9, LINE2, LINE3 = range(6)  # kinds
@@ -28,13 +29,13 @@ class ShapesAt(NamedTuple):
     curvatures: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def room_for_shapes() -> ShapesAt:
     """Workspace that `evaluate_shapes` fills."""
     return ShapesAt(np.zeros(9), np.zeros((2, 9)), np.zeros((3, 9)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def evaluate_shapes(kind: int, xi: float, eta: float, out: ShapesAt) -> None:
     """Write the shape functions of a facet of the given kind at (xi, eta) into `out`."""
     N, d, c = out.values, out.slopes, out.curvatures
@@ -57,7 +58,7 @@ def evaluate_shapes(kind: int, xi: float, eta: float, out: ShapesAt) -> None:
         c[0, 0], c[0, 1], c[0, 2] = 1.0, 1.0, -2.0
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _triangle6(xi, eta, N, d, c):
     L0 = 1 - xi - eta
     N[0], N[1], N[2] = L0 * (2 * L0 - 1), xi * (2 * xi - 1), eta * (2 * eta - 1)
@@ -69,7 +70,7 @@ def _triangle6(xi, eta, N, d, c):
     c[2, 0], c[2, 3], c[2, 4], c[2, 5] = 4.0, -4.0, 4.0, -4.0
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _quad9(xi, eta, N, d, c):
     for a in range(9):
         x, dx, cx = _quadratic(xi, _QUAD_XI[a])
@@ -78,7 +79,7 @@ def _quad9(xi, eta, N, d, c):
         c[0, a], c[1, a], c[2, a] = cx * y, x * cy, dx * dy
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _quadratic(t, node):
     """Value, derivative and second derivative of the quadratic function of a node at -1, 0 or 1."""
     if node == 0.0:
@@ -86,7 +87,7 @@ def _quadratic(t, node):
     return 0.5 * t * (t + node), t + 0.5 * node, 1.0
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _serendipity(xi, eta, N, d, c):
     for a in range(8):
         p, q = _QUAD_XI[a], _QUAD_ETA[a]
@@ -103,7 +104,7 @@ def _serendipity(xi, eta, N, d, c):
             c[0, a], c[1, a], c[2, a] = 0.5 * y, 0.5 * x, 0.25 * p * q * (1 + 2 * p * xi + 2 * q * eta)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def place_on(kind: int, corners: np.ndarray, shapes: ShapesAt, x: np.ndarray, tangents: np.ndarray) -> None:
     """Place x (3,) and tangents (2, 3) of a facet whose nodes are at `corners` (9, 3), by its shape functions there."""
     for i in range(3):
@@ -116,7 +117,7 @@ def place_on(kind: int, corners: np.ndarray, shapes: ShapesAt, x: np.ndarray, ta
         tangents[1, 2] = 1.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def unit_normal(tangents: np.ndarray, normal: np.ndarray) -> float:
     """Fill the unit normal (3,) of tangents (2, 3); returns the area that they span."""
     a, b = tangents[0], tangents[1]
@@ -127,7 +128,7 @@ def unit_normal(tangents: np.ndarray, normal: np.ndarray) -> float:
     return size
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def clamp(kind: int, xi: float, eta: float) -> tuple[float, float]:
     """The nearest coordinates within a facet and a margin around it.
 
@@ -148,7 +149,7 @@ def clamp(kind: int, xi: float, eta: float) -> tuple[float, float]:
     return max(-MARGIN, xi), max(-MARGIN, eta)
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def closest_on(kind: int, corners: np.ndarray, x: np.ndarray, xi: float, eta: float, shapes: ShapesAt) -> tuple[float, float]:
     """Coordinates of the point of a facet (nodes at `corners`, (9, 3)) that is closest to x (3,), from a first guess.
 

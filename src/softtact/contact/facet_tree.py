@@ -6,8 +6,8 @@ The search uses flat triangles between the nodes of curved facets; the closest p
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.contact.facet_shapes import LINE2, LINE3, QUAD8, QUAD9, TRI3, TRI6
 
 _LEAF = 4  # triangles in a box that is not divided further
@@ -73,31 +73,40 @@ def build_tree(nodes: np.ndarray, kinds: np.ndarray, x: np.ndarray) -> FacetTree
     return tree
 
 
-@njit(cache=True, nogil=True)
 def _divide(centres):
-    """Order of the triangles, and the boxes' `first` and `count`: boxes are halved along the longest side down to small leaves."""
-    total = len(centres)
-    order, boxes = np.arange(total), 2 * total + 1
-    first, count = np.zeros(boxes, np.int64), np.zeros(boxes, np.int64)
-    begin, end = np.zeros(boxes, np.int64), np.zeros(boxes, np.int64)
-    end[0], used, box = total, 1, 0
-    while box < used:
-        start, stop = begin[box], end[box]
-        if stop - start <= _LEAF:
-            first[box], count[box] = start, stop - start
-        else:
-            inside = centres[order[start:stop]]
-            spread = np.array([inside[:, i].max() - inside[:, i].min() for i in range(3)])
-            order[start:stop] = order[start:stop][np.argsort(inside[:, spread.argmax()])]
-            middle = (start + stop) // 2
-            begin[used], end[used], begin[used + 1], end[used + 1] = start, middle, middle, stop
-            first[box] = used
-            used += 2
-        box += 1
-    return order, first[:used].copy(), count[:used].copy()
+    """Order of the triangles, and the boxes' `first` and `count`: boxes are halved along the longest side down to small leaves.
+
+    All boxes of one level are halved at once; those of the next level follow them.
+    """
+    order, first, count, boxes = np.arange(len(centres)), [], [], 0
+    begin, end = np.zeros(1, dtype=np.int64), np.full(1, len(centres))
+    while len(begin):
+        halved = end - begin > _LEAF
+        boxes += len(begin)
+        first.append(np.where(halved, boxes + 2 * (np.cumsum(halved) - 1), begin))
+        count.append(np.where(halved, 0, end - begin))
+        begin, end = begin[halved], end[halved]
+        _sort_along_longest_sides(order, centres, begin, end)
+        middle = (begin + end) // 2
+        begin, end = np.column_stack([begin, middle]).ravel(), np.column_stack([middle, end]).ravel()
+    return order, np.concatenate(first), np.concatenate(count)
 
 
-@njit(cache=True, nogil=True)
+def _sort_along_longest_sides(order, centres, begin, end):
+    """Sort the parts from `begin` to `end` (b,) of the order (n,) of triangles, each along its box' longest side, in place."""
+    sizes = end - begin
+    if not len(sizes):
+        return
+    starts = np.cumsum(sizes) - sizes
+    box = np.repeat(np.arange(len(sizes)), sizes)
+    places = np.arange(len(box)) + (begin - starts)[box]
+    inside = centres[order[places]]
+    longest = (np.maximum.reduceat(inside, starts) - np.minimum.reduceat(inside, starts)).argmax(axis=1)
+    along = inside[np.arange(len(box)), longest[box]]
+    order[places] = order[places[np.lexsort((along, box))]]
+
+
+@compiled
 def refit(tree: FacetTree, x: np.ndarray) -> None:
     """Fit the boxes to nodes at x (n, 3) in mm."""
     for box in range(len(tree.first) - 1, -1, -1):  # children come after their parents
@@ -113,7 +122,7 @@ def refit(tree: FacetTree, x: np.ndarray) -> None:
             tree.low[box, i], tree.high[box, i] = low, high
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def nearest(
     tree: FacetTree, x: np.ndarray, point: np.ndarray, against: np.ndarray, least_cosine: float, reach: float, excluded: np.ndarray
 ) -> tuple[int, float, float]:
@@ -152,7 +161,7 @@ def nearest(
     return found, xi, eta
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _touches(corners, excluded):
     for node in excluded:
         if node >= 0 and (corners[0] == node or corners[1] == node or corners[2] == node):
@@ -160,7 +169,7 @@ def _touches(corners, excluded):
     return False
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _box_distance(tree, box, point):
     total = 0.0
     for i in range(3):
@@ -169,7 +178,7 @@ def _box_distance(tree, box, point):
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _cosine(a, b, c, against, line):
     """-n . against of a triangle's unit normal n; a line's is its tangent's, turned to the right."""
     if line:
@@ -181,7 +190,7 @@ def _cosine(a, b, c, against, line):
     return -(n0 * against[0] + n1 * against[1] + n2 * against[2]) / size if size > 0 else -2.0
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def closest_in_triangle(a: np.ndarray, b: np.ndarray, c: np.ndarray, p: np.ndarray) -> tuple[float, float, float]:
     """Squared distance (mm2) of p (3,) from a triangle, and the closest point's u, v in a + u (b - a) + v (c - a).
 

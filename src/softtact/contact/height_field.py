@@ -10,7 +10,8 @@ from typing import Self
 
 import numpy as np
 import trimesh
-from numba import njit
+
+from softtact.compiled import compiled
 
 NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 
@@ -162,13 +163,14 @@ def _fill_bins(triangles, origin, size, bins):
     return _listed(low, high, bins)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _listed(low, high, bins):
     """Which boxes of bins, from low to high (t, 2), cover each bin: starts (bins^2 + 1,), members in rising order."""
     starts = np.zeros(bins * bins + 1, dtype=np.int64)
     for t in range(len(low)):
         for j in range(low[t, 1], high[t, 1] + 1):
-            starts[j * bins + low[t, 0] + 1:j * bins + high[t, 0] + 2] += 1
+            for i in range(low[t, 0], high[t, 0] + 1):
+                starts[j * bins + i + 1] += 1
     starts = np.cumsum(starts)
     members, fill = np.empty(starts[-1], dtype=np.int64), starts[:-1].copy()
     for t in range(len(low)):
@@ -179,7 +181,7 @@ def _listed(low, high, bins):
     return starts, members
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _lowest_crossing(x, y, triangles, origin, size, bins, starts, members):
     heights = np.full(len(x), NO_CONTACT_MM)
     index = np.full(len(x), -1)

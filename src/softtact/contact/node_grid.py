@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.ndimage import binary_erosion
 
+from softtact.compiled import compiled
 from softtact.contact.object_points import ObjectPoints
 
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
@@ -127,7 +127,7 @@ class Stencil:
         return lambda x: _apply(np.ascontiguousarray(x, dtype=np.float32), neighbours, weights)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _apply(x, neighbours, weights):
     out = np.zeros_like(x)
     for n in range(len(neighbours)):

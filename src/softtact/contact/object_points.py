@@ -9,7 +9,8 @@ node (`ObjectPoints.covered_at`). `models/foundation/dof_maps` derives the conta
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
+
+from softtact.compiled import compiled
 
 SAMPLES = 8          # samples per grid step around nodes near an edge
 REACH = 2            # grid steps sampled on each side of a node: the hat function's width and a displacement of one step
@@ -114,7 +115,7 @@ def window_places() -> np.ndarray:
     return (np.arange(2 * REACH * SAMPLES) + 0.5) / SAMPLES - REACH
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def hat_shares(window: np.ndarray, moved: np.ndarray, highest: float) -> np.ndarray:
     """Covered shares (e,) under hat functions moved by (e, 2) steps; samples higher than `highest` do not count."""
     size = window.shape[1]

@@ -8,8 +8,8 @@ Reference: Puso and Laursen, Comput. Methods Appl. Mech. Engng 193 (2004) 601, s
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.contact.facet_shapes import QUAD8
 from softtact.contact.surfaces import TRIANGLE_POINTS, TRIANGLE_WEIGHTS, Surface, SurfacePoints, points_at
 
@@ -67,7 +67,7 @@ def _pieces(own, places, others, reach):
     return _cut_all(own, places, others[order], low[order], high[order], float(np.max(high[:, 0] - low[:, 0], initial=0.0)), reach)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cut_all(own, places, others, low, high, widest, reach):
     which, pieces, used = np.empty(64, np.int64), np.empty((64, 3, 2)), 0
     starts = low[:, 0].copy()
@@ -85,26 +85,28 @@ def _cut_all(own, places, others, low, high, widest, reach):
                 continue
             polygon = _clip(base, _in_plane(others[k], a, e, f))
             for corner in range(1, len(polygon) - 1):
-                piece = np.empty((3, 2))
-                for c, place in enumerate((0, corner, corner + 1)):
-                    piece[c] = _coordinates(base, places[t], polygon[place])
                 if _area(polygon[0], polygon[corner], polygon[corner + 1]) <= _SLIVER * size:
                     continue
                 if used == len(which):
                     which, pieces = _longer(which, pieces)
-                which[used], pieces[used] = t, piece
+                for c, place in enumerate((0, corner, corner + 1)):
+                    pieces[used, c, 0], pieces[used, c, 1] = _coordinates(base, places[t], polygon[place])
+                which[used] = t
                 used += 1
     return which[:used].copy(), pieces[:used].copy()
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _longer(which, pieces):
     more, larger = np.empty(2 * len(which), np.int64), np.empty((2 * len(which), 3, 2))
-    more[: len(which)], larger[: len(which)] = which, pieces
+    for k in range(len(which)):
+        more[k] = which[k]
+        for c in range(3):
+            larger[k, c, 0], larger[k, c, 1] = pieces[k, c, 0], pieces[k, c, 1]
     return more, larger
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _plane(triangle, e, f, n):
     """Fill unit vectors e, f in a triangle's plane and its normal n; returns twice its area."""
     p, q = triangle[1] - triangle[0], triangle[2] - triangle[0]
@@ -112,12 +114,12 @@ def _plane(triangle, e, f, n):
     size, length = np.sqrt((n * n).sum()), np.sqrt((p * p).sum())
     if size > 0:
         n /= size
-        e[:] = p / length
+        e[0], e[1], e[2] = p[0] / length, p[1] / length, p[2] / length
         f[0], f[1], f[2] = n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]
     return size
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _in_plane(triangle, origin, e, f):
     out = np.empty((3, 2))
     for c in range(3):
@@ -126,7 +128,7 @@ def _in_plane(triangle, origin, e, f):
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _faces(other, n, origin, reach):
     """Whether a triangle's normal is opposite to n, and the triangle is within reach of the plane through `origin`."""
     p, q = other[1] - other[0], other[2] - other[0]
@@ -139,17 +141,18 @@ def _faces(other, n, origin, reach):
     return turned < 0 and (nearest <= reach or low * high < 0)
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _area(a, b, c):
     return abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _clip(base, other):
     """The polygon (k, 2) that two triangles in the plane have in common. (Sutherland and Hodgman, Comm. ACM 17 (1974) 32.)"""
     turn = (other[1, 0] - other[0, 0]) * (other[2, 1] - other[0, 1]) - (other[1, 1] - other[0, 1]) * (other[2, 0] - other[0, 0])
     polygon, count = np.empty((9, 2)), 3
-    polygon[:3] = base
+    for c in range(3):
+        polygon[c, 0], polygon[c, 1] = base[c, 0], base[c, 1]
     for side in range(3):
         a, b = other[side], other[(side + 1) % 3]
         kept, fresh = np.empty((9, 2)), 0
@@ -157,10 +160,11 @@ def _clip(base, other):
             here, there = polygon[k], polygon[(k + 1) % count]
             inside, outside = _left(a, b, here) * turn, _left(a, b, there) * turn
             if inside >= 0:
-                kept[fresh] = here
+                kept[fresh, 0], kept[fresh, 1] = here[0], here[1]
                 fresh += 1
             if (inside >= 0) != (outside >= 0):
-                kept[fresh] = here + inside / (inside - outside) * (there - here)
+                share = inside / (inside - outside)
+                kept[fresh, 0], kept[fresh, 1] = here[0] + share * (there[0] - here[0]), here[1] + share * (there[1] - here[1])
                 fresh += 1
         polygon, count = kept, fresh
         if count == 0:
@@ -168,18 +172,20 @@ def _clip(base, other):
     return polygon[:count]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _left(a, b, p):
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _coordinates(base, places, point):
     """Coordinates on the facet of a point in the plane of one of its triangles."""
     p, q, r = base[1] - base[0], base[2] - base[0], point - base[0]
     whole = p[0] * q[1] - p[1] * q[0]
     u, v = (r[0] * q[1] - r[1] * q[0]) / whole, (p[0] * r[1] - p[1] * r[0]) / whole
-    return places[0] + u * (places[1] - places[0]) + v * (places[2] - places[0])
+    first, second, third = places[0], places[1], places[2]
+    return (first[0] + u * (second[0] - first[0]) + v * (third[0] - first[0]),
+            first[1] + u * (second[1] - first[1]) + v * (third[1] - first[1]))
 
 
 def _line_pieces(surface, other, x, reach):

@@ -9,8 +9,8 @@ Reference: Wriggers, Computational Contact Mechanics, 2nd ed. (2006), section 4.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.contact.facet_shapes import (
     LINE2,
     MARGIN,
@@ -45,7 +45,7 @@ class Projection(NamedTuple):
     """(p,) whether the projection is inside its facet or margin; at the margin's end the normal does not rotate with the point."""
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def project(
     points: SurfacePoints,
     nodes: np.ndarray,
@@ -79,7 +79,7 @@ def project(
         if (
             before[p] >= 0
             and _meets(out, p, before[p], near[p, 0], near[p, 1], own, nodes, kinds, rims, x, _LEAVES * rim, room)
-            and (out.inner[p] and abs(out.gap[p]) < reach and -(out.normal[p] * normal).sum() >= least_cosine)
+            and (out.inner[p] and abs(out.gap[p]) < reach and -_product(out.normal[p], normal) >= least_cosine)
         ):
             continue
         out.facet[p], out.gap[p] = -1, np.inf
@@ -92,7 +92,7 @@ def project(
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _beside2(out, p, own, nodes, kinds, x, room):
     """Squared tangential distance (mm2) of point p, at `own` (3,), from its facet.
 
@@ -116,22 +116,32 @@ def _beside2(out, p, own, nodes, kinds, x, room):
     return total - out.gap[p] ** 2
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room):
     """Write the projection of point p, at `own` (3,), on a facet; returns whether it lies within the surface's rim."""
     corners, tangents, normal, place, kind = np.zeros((9, 3)), np.empty((2, 3)), np.empty(3), np.empty(3), kinds[facet]
     for a in range(NODES_OF[kind]):
-        corners[a] = x[nodes[facet, a]]
+        for i in range(3):
+            corners[a, i] = x[nodes[facet, a], i]
     xi, eta = closest_on(kind, corners, own, xi, eta, room)
     evaluate_shapes(kind, xi, eta, room)
     place_on(kind, corners, room, place, tangents)
     unit_normal(tangents, normal)
-    out.facet[p], out.coordinates[p, 0], out.coordinates[p, 1], out.normal[p] = facet, xi, eta, normal
-    out.gap[p], out.inner[p] = (normal * (own - place)).sum(), _inside(kind, xi, eta)
+    out.facet[p], out.coordinates[p, 0], out.coordinates[p, 1], out.gap[p] = facet, xi, eta, 0.0
+    for i in range(3):
+        out.normal[p, i] = normal[i]
+        out.gap[p] += normal[i] * (own[i] - place[i])
+    out.inner[p] = _inside(kind, xi, eta)
     return not _beyond_rim(kind, xi, eta, rims[facet], tangents, rim)
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
+def _product(a, b):
+    """The scalar product of two vectors (3,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled(inline="always")
 def _inside(kind, xi, eta):
     limit = 1 + 2 * MARGIN - _AT_EDGE
     if kind >= LINE2:
@@ -141,10 +151,10 @@ def _inside(kind, xi, eta):
     return xi > -MARGIN + _AT_EDGE and eta > -MARGIN + _AT_EDGE and xi + eta < 1 + MARGIN - _AT_EDGE
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _beyond_rim(kind, xi, eta, rims, tangents, rim):
     """Whether coordinates lie farther than `rim` (mm) beyond an edge that ends the surface."""
-    a, b = np.sqrt((tangents[0] ** 2).sum()), np.sqrt((tangents[1] ** 2).sum())
+    a, b = np.sqrt(_product(tangents[0], tangents[0])), np.sqrt(_product(tangents[1], tangents[1]))
     if kind >= LINE2:
         return (rims[0] and (-1 - xi) * a > rim) or (rims[1] and (xi - 1) * a > rim)
     if kind >= QUAD8:
@@ -157,7 +167,7 @@ def _beyond_rim(kind, xi, eta, rims, tangents, rim):
     return (rims[0] and -eta * b > rim) or (rims[1] and (xi + eta - 1) * min(a, b) > rim) or (rims[2] and -xi * a > rim)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_forces_of(
     force: np.ndarray,
     points: SurfacePoints,
@@ -188,7 +198,7 @@ def add_forces_of(
                 force[nodes[facet[p], a], i] += w * room.values[a] * traction[p, i]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _forms(points, p, kind, room, width, coupled, rows):
     """Write both sides' shape values into row 0 of `rows`, the other side's derivatives into rows 1, 2, from column `width` on."""
     rows[:] = 0.0
@@ -200,7 +210,7 @@ def _forms(points, p, kind, room, width, coupled, rows):
             rows[1, width + a], rows[2, width + a] = room.slopes[0, a], room.slopes[1, a]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_pair_tangents(
     out: np.ndarray,
     pair: np.ndarray,
@@ -227,7 +237,8 @@ def add_pair_tangents(
         facet = projection.facet[p]
         kind, n = kinds[facet], projection.normal[p]
         for a in range(NODES_OF[kind]):
-            corners[a] = x[nodes[facet, a]]
+            for i in range(3):
+                corners[a, i] = x[nodes[facet, a], i]
         evaluate_shapes(kind, projection.coordinates[p, 0], projection.coordinates[p, 1], room)
         place_on(kind, corners, room, place, tangents)
         _forms(points, p, kind, room, width, coupled, rows)
@@ -238,7 +249,7 @@ def add_pair_tangents(
             _add_turning(out[pair[p]], -points.weight[p] * pressure[p], rows, n, tangents, kappa, projection.gap[p])
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _along(values, direction, form):
     """The form (3 k,) of nodal values (k,) along a direction (3,)."""
     for a in range(len(values)):
@@ -246,7 +257,7 @@ def _along(values, direction, form):
             form[3 * a + i] = values[a] * direction[i]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _add_turning(matrix, factor, rows, n, tangents, kappa, gap):
     """The upper triangle of factor times d2g, see the module's docstring; rows: see `_forms`."""
     columns = len(matrix)
@@ -254,18 +265,20 @@ def _add_turning(matrix, factor, rows, n, tangents, kappa, gap):
     M, metric = np.empty((2, 2)), np.empty((2, 2))
     for i in range(2):
         for j in range(2):
-            metric[i, j] = (tangents[i] * tangents[j]).sum()
+            metric[i, j] = _product(tangents[i], tangents[j])
             M[i, j] = metric[i, j] - gap * kappa[i, j]
     _invert(M)
     _invert(metric)
     for d in range(2):
         _along(rows[1 + d], n, N[d])
         _along(rows[0], tangents[d], T[d])
-        T[d] += gap * N[d]
-    for d in range(2):
-        D[d] = M[d, 0] * T[0] + M[d, 1] * T[1]
-    for d in range(2):
-        T[d] = N[d] + kappa[d, 0] * D[0] + kappa[d, 1] * D[1]
+    for c in range(columns):
+        for d in range(2):
+            T[d, c] += gap * N[d, c]
+        for d in range(2):
+            D[d, c] = M[d, 0] * T[0, c] + M[d, 1] * T[1, c]
+        for d in range(2):
+            T[d, c] = N[d, c] + kappa[d, 0] * D[0, c] + kappa[d, 1] * D[1, c]
     for r in range(columns):
         for c in range(r, columns):
             value = 0.0
@@ -276,7 +289,7 @@ def _add_turning(matrix, factor, rows, n, tangents, kappa, gap):
             matrix[r, c] += factor * value
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _add_square(matrix, factor, form):
     """The upper triangle of factor times form form^T."""
     for r in range(len(form)):
@@ -286,7 +299,7 @@ def _add_square(matrix, factor, form):
                 matrix[r, c] += scaled * form[c]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _curvature(kind, corners, room, n, kappa):
     kappa[:] = 0.0
     for a in range(NODES_OF[kind]):
@@ -297,7 +310,7 @@ def _curvature(kind, corners, room, n, kappa):
     kappa[1, 0] = kappa[0, 1]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _invert(m):
     determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
     m[0, 0], m[1, 1], m[0, 1], m[1, 0] = (
@@ -308,7 +321,7 @@ def _invert(m):
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_friction_tangents(
     out: np.ndarray,
     pair: np.ndarray,

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
+
+from softtact.compiled import compiled
 
 
 class SymmetricPattern:
@@ -22,7 +23,7 @@ class SymmetricPattern:
         self.size = int(counts.sum())
         self._rank = np.where(free, np.cumsum(free, axis=1) - 1, -1)
         offsets, members = _ragged(elements)
-        self._starts, self._neighbours = _node_graph(counts, offsets, members)
+        self._starts, self._neighbours = _with_sorted_rows(*_node_graph(counts, offsets, members))
         self._before = _columns_before(self._starts, self._neighbours, counts)
         self.indptr, self.indices = _expand(self.number, counts, self._starts, self._neighbours)
 
@@ -42,9 +43,17 @@ def _ragged(elements):
     return np.concatenate([[0], np.cumsum(sizes)]), np.concatenate([nodes.ravel() for nodes in elements])
 
 
-@njit(cache=True, nogil=True)
+def _with_sorted_rows(starts, neighbours):
+    """Compressed rows with rising neighbours."""
+    nodes = len(starts) - 1
+    graph = sp.csr_matrix((np.ones(len(neighbours), dtype=bool), neighbours, starts), shape=(nodes, nodes))
+    graph.sort_indices()
+    return starts, graph.indices.astype(np.int64)
+
+
+@compiled
 def _node_graph(counts, offsets, members):
-    """Compressed rows of the nodes b >= a that share an element with node a; nodes without unknowns are left out."""
+    """Compressed rows of the nodes b >= a that share an element with node a, in any order; nodes without unknowns are left out."""
     nodes = len(counts)
     begin = np.zeros(nodes + 1, np.int64)
     for node in members:
@@ -56,28 +65,26 @@ def _node_graph(counts, offsets, members):
             elements_of[fill[members[k]]] = e
             fill[members[k]] += 1
     starts, seen = np.zeros(nodes + 1, np.int64), np.full(nodes, -1)
-    row, neighbours, used = np.empty(nodes, np.int64), np.empty(16 * nodes, np.int64), 0
+    neighbours, used = np.empty(16 * nodes, np.int64), 0
     for a in range(nodes):
-        length = 0
+        if used + nodes > len(neighbours):
+            longer = np.empty(2 * (used + nodes), np.int64)
+            for t in range(used):
+                longer[t] = neighbours[t]
+            neighbours = longer
         for t in range(begin[a], begin[a + 1] if counts[a] else begin[a]):
             e = elements_of[t]
             for k in range(offsets[e], offsets[e + 1]):
                 b = members[k]
                 if b >= a and counts[b] and seen[b] != a:
                     seen[b] = a
-                    row[length] = b
-                    length += 1
-        if used + length > len(neighbours):
-            longer = np.empty(2 * (used + length), np.int64)
-            longer[:used] = neighbours[:used]
-            neighbours = longer
-        neighbours[used:used + length] = np.sort(row[:length])
-        used += length
+                    neighbours[used] = b
+                    used += 1
         starts[a + 1] = used
     return starts, neighbours[:used].copy()
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _columns_before(starts, neighbours, counts):
     """Number of unknowns in a node's row before each of its neighbours."""
     before = np.empty(len(neighbours), np.int64)
@@ -89,7 +96,7 @@ def _columns_before(starts, neighbours, counts):
     return before
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _expand(number, counts, starts, neighbours):
     """indptr and indices (int32) of the unknowns' pattern from the graph of the nodes."""
     size = counts.sum()
@@ -118,7 +125,7 @@ def _expand(number, counts, starts, neighbours):
     return indptr, indices
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _place_of(value, low, high, wanted):
     """Index of the wanted value among the rising values from low to high (binary search)."""
     while high - low > 1:
@@ -130,7 +137,7 @@ def _place_of(value, low, high, wanted):
     return low
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _positions(nodes, number, rank, starts, neighbours, before, indptr):
     elements, m = nodes.shape
     k = 3 * m
@@ -155,13 +162,13 @@ def _positions(nodes, number, rank, starts, neighbours, before, indptr):
     return out
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def _entries_before(row, size):
     """The position that column 0 of a row would have among the entries (i, j >= i) of a matrix, row by row."""
     return row * size - row * (row - 1) // 2 - row
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_upper(values: np.ndarray, matrices: np.ndarray, positions: np.ndarray) -> None:
     """Add symmetric element matrices (e, k, k) at their `positions`."""
     k = matrices.shape[1]
@@ -188,7 +195,7 @@ def upper_pattern(members: Sequence[np.ndarray], size: int) -> tuple[np.ndarray,
     return pattern.indptr, pattern.indices
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def upper_positions(indptr: np.ndarray, indices: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     """Positions (e, k (k + 1) / 2) in the upper triangle's values of the entries (i, j >= i) of element matrices, unknowns (e, k).
 

@@ -7,7 +7,8 @@ xx, yy, zz, xy, yz, zx. All kernels run on one core and release the GIL.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from softtact.compiled import compiled
 
 _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
@@ -74,7 +75,7 @@ class VolumeResponse(NamedTuple):
                              quartic=self.quartic[part] if self.quartic.size else self.quartic)
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})     # sums over nodes, several at once
+@compiled(fastmath={"reassoc", "contract"})     # sums over nodes, several at once
 def _gradient(along, slopes):
     """Derivatives by x, y, z of one displacement component with nodal values (m,); slopes (3, m): shape gradients at a point."""
     by_x, by_y, by_z = 0.0, 0.0, 0.0
@@ -85,7 +86,7 @@ def _gradient(along, slopes):
     return by_x, by_y, by_z
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def deformation(displacement: np.ndarray, at_rest: ElementArrays) -> Deformation:
     """`Deformation` of elements, given by their `ElementArrays`, from nodal displacement (e, m, 3) in mm."""
     gradients, shapes = at_rest.gradients, at_rest.shapes
@@ -116,7 +117,7 @@ def deformation(displacement: np.ndarray, at_rest: ElementArrays) -> Deformation
     return Deformation(F, C, J)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_forces(total: np.ndarray, nodes: np.ndarray, forces: np.ndarray) -> None:
     """Add element forces (e, m, 3) to the nodal forces (n, 3); nodes (e, m)."""
     for e in range(len(nodes)):
@@ -125,7 +126,7 @@ def add_forces(total: np.ndarray, nodes: np.ndarray, forces: np.ndarray) -> None
                 total[nodes[e, a], i] += forces[e, a, i]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def inverse_symmetric(c: np.ndarray) -> np.ndarray:
     """Inverse (6,) of a symmetric 3 x 3 tensor (6,)."""
     xx, yy, zz, xy, yz, zx = c[0], c[1], c[2], c[3], c[4], c[5]
@@ -140,7 +141,7 @@ def inverse_symmetric(c: np.ndarray) -> np.ndarray:
     return out / determinant
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def internal_force(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, pressure: np.ndarray) -> np.ndarray:
     """Nodal forces (e, 3 m) in N: isochoric second Piola-Kirchhoff stress (e*g, 6) plus pressure (e, g) J C^-1, both in MPa."""
     F, C, J = deformed.F, deformed.C, deformed.J
@@ -175,7 +176,7 @@ def internal_force(deformed: Deformation, at_rest: ElementArrays, stress: np.nda
     return force
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _elasticity(A, f, S, D):
     """First elasticity tensor A (k, ij, l) = F_ip F_jq D_pkql + delta_ij S_kl, pairs ij as in `_PAIR`, from D (6, 6) at rest."""
     half = np.empty((3, 6))
@@ -192,7 +193,7 @@ def _elasticity(A, f, S, D):
                     A[k, _PAIR[i] + j, l] = total
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _moduli(D, S, stress, moduli, inverse, w, pj, local):
     """Stress S (3, 3) and material tangent D (6, 6) at a point, both times its volume w.
 
@@ -209,7 +210,7 @@ def _moduli(D, S, stress, moduli, inverse, w, pj, local):
             D[m, k] = D[k, m]
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _volume_change(change, f, inverse, slopes, scale):
     """Write the derivatives of a point's volume by the nodal displacements, scale F C^-1 : G, into `change`, by components."""
     number, (by_x, by_y, by_z), width = slopes.dtype.type, (slopes[0], slopes[1], slopes[2]), slopes.shape[1]
@@ -222,7 +223,7 @@ def _volume_change(change, f, inverse, slopes, scale):
             part[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _times_gradients(right, A, slopes):
     """A_ij G of a point (3, 6 width), the pairs ij side by side, from A (3, 6, 3) and the gradients G (3, width)."""
     by_x, by_y, by_z, width = slopes[0], slopes[1], slopes[2], slopes.shape[1]
@@ -233,7 +234,7 @@ def _times_gradients(right, A, slopes):
                 part[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _add_products(blocks, G, right):
     """Blocks (even, 6 width) plus G^T (A_ij G) of two points: gradients G (6, width), A_ij G (6, 6 width).
 
@@ -251,7 +252,7 @@ def _add_products(blocks, G, right):
             second[b] += t0 * x0 + t1 * x1 + t2 * x2 + t3 * x3 + t4 * x4 + t5 * x5
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _add_modes(blocks, nodes, left, right):
     """Blocks plus left^T right of modes (p, 3 width), p a multiple of `_AT_ONCE`."""
     width = left.shape[1] // 3
@@ -266,7 +267,7 @@ def _add_modes(blocks, nodes, left, right):
                     row[b] += w * r0[b] + x * r1[b] + y * r2[b] + z * r3[b]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _add_volumetric(blocks, nodes, change, modes, volumes, volume, e):
     """Add the blocks of an element's projected volume change and of the quartic penalty, without the latter's pointwise part.
 
@@ -289,16 +290,17 @@ def _add_volumetric(blocks, nodes, change, modes, volumes, volume, e):
     _add_modes(blocks, nodes, half, projected)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _weighted(basis, weights):
     """Functions (g, p), each times its point's weight (g,), in the functions' precision."""
     out = np.empty_like(basis)
     for g in range(len(weights)):
-        out[g] = weights[g] * basis[g]
+        for p in range(basis.shape[1]):
+            out[g, p] = weights[g] * basis[g, p]
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _spread(K, blocks, width):
     """Fill K (3 m, 3 m), unknowns node by node, from the blocks of pairs (ij) of components."""
     nodes = len(K) // 3
@@ -310,15 +312,17 @@ def _spread(K, blocks, width):
                     K[3 * a + i, 3 * b + j] = K[3 * b + j, 3 * a + i] = blocks[a, start + b]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _padded(values, rows, columns, like):
     """A copy of the values (n, k) in the precision of another array, with zeros up to (rows, columns)."""
     out = np.zeros((rows, columns), like.dtype)
-    out[:len(values), :values.shape[1]] = values
+    for i in range(len(values)):
+        for j in range(values.shape[1]):
+            out[i, j] = values[i, j]
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, moduli: np.ndarray, volume: VolumeResponse,
             like: np.ndarray) -> np.ndarray:
     """Tangent (e, 3 m, 3 m) in N/mm of `internal_force` with the pressure of a `VolumeResponse`.
@@ -354,7 +358,9 @@ def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, m
                 local += quartic[e, g] * j * j
             _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
             _elasticity(A, F[e, g], S, D)
-            slopes[:, :nodes] = gradients[shapes[e], g]
+            for i in range(3):
+                for a in range(nodes):
+                    slopes[i, a] = gradients[shapes[e], g, i, a]
             _volume_change(change[g], F[e, g], inverse, slopes, w * j)
             _times_gradients(right[3 * (g % 2):], A, slopes)
             if g % 2 == 1:
@@ -368,7 +374,7 @@ def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, m
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _sym(tensor, i, j):
     """Component (i, j) of a symmetric tensor stored as xx, yy, zz, xy, yz, zx."""
     if i == j:
@@ -378,7 +384,7 @@ def _sym(tensor, i, j):
     return tensor[4] if i + j == 3 else tensor[5]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def project(field: np.ndarray, at_rest: ElementArrays) -> np.ndarray:
     """Fields (e, g) of elements, projected on the functions of the pressure (e, g)."""
     out = np.empty(field.shape)
@@ -387,7 +393,7 @@ def project(field: np.ndarray, at_rest: ElementArrays) -> np.ndarray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_penalties(J: np.ndarray, at_rest: ElementArrays, seen: np.ndarray, density: np.ndarray, pressure: np.ndarray,
                   penalties: VolumePenalties) -> tuple[np.ndarray, np.ndarray]:
     """Volumetric energies (e,) in mJ; second derivative (e, g) in MPa of the quartic penalty, or (0, 0) without it.
@@ -413,11 +419,12 @@ def add_penalties(J: np.ndarray, at_rest: ElementArrays, seen: np.ndarray, densi
             energies[e] += volumes[shape, g] * energy
         if q > 0:
             _project(held, volumes[shape], at_rest.basis, at_rest.gram_inverse[shape], share)
-            pressure[e] += held - share
+            for g in range(points):
+                pressure[e, g] += held[g] - share[g]
     return energies, quartic
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _project(field, w, basis, gram_inverse, out):
     """An element's field (g,) projected on the functions of the pressure, into `out` (g,)."""
     points, modes = basis.shape

@@ -14,8 +14,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.fem.solid_block import SolidBlock
 from softtact.linalg.lapack import ROUTINES, add_row, address, call, keep_alive, row_product
 from softtact.linalg.workers import SERIAL, Workers, slices
@@ -58,7 +58,9 @@ class Condensation:
     """
 
     def __init__(self, bodies: int, inner: int, outer: int, element_dofs: Iterable[np.ndarray]) -> None:
-        self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
+        groups = tuple(element_dofs)
+        self._unknowns = np.concatenate([dofs.ravel() for dofs in groups])      # of one element after the other ...
+        self._widths = np.repeat([dofs.shape[1] for dofs in groups], [len(dofs) for dofs in groups])     # ... so many each
         self._store = _Store(rows=np.zeros((bodies, inner, inner + outer), dtype=np.float32),
                              outer=np.zeros((bodies, outer, outer), dtype=np.float32), modified=np.zeros(bodies, dtype=bool))
         self._judged = np.zeros(bodies, dtype=bool)     # whether `make_positive` has checked a body since it was set ...
@@ -83,7 +85,9 @@ class Condensation:
         """
         springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
         damping = np.zeros(len(bodies)) if damping is None else damping
-        _set(bodies, damping, tuple(tangents), self._dofs, springs, self._store, ROUTINES)
+        springs = springs._replace(stiffness=np.ascontiguousarray(springs.stiffness))
+        stiffness = np.concatenate([group.reshape(len(bodies), -1) for group in tangents], axis=1)
+        _set(bodies, damping, stiffness, self._unknowns, self._widths, springs, self._store, ROUTINES)
         self._judged[bodies] = False
         for body in bodies:
             self._positive.pop(int(body), None)
@@ -146,26 +150,29 @@ def packed(matrices: np.ndarray) -> np.ndarray:
     return out.reshape(*like, -1)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _pack(matrices, out):
     width = matrices.shape[1]
     for k in range(len(matrices)):
         start = 0
         for i in range(width):
-            out[k, start:start + width - i] = matrices[k, i, i:]
+            for j in range(width - i):
+                out[k, start + j] = matrices[k, i, i + j]
             start += width - i
 
 
-@njit(cache=True, nogil=True)
-def _set(bodies, damping, tangents, dofs, springs, store, blas):
+@compiled
+def _set(bodies, damping, tangents, unknowns, widths, springs, store, blas):
+    """Set bodies (b,) from their elements' packed tangents (b, w), which belong to `widths` (k,) of the unknowns each."""
     n, m = store.rows.shape[1], store.outer.shape[1]
     matrix = np.empty((n + m, n + m), np.float32)
     for b in range(len(bodies)):
         for i in range(n + m):
             matrix[i, i:] = 0.0
-        for group in range(len(dofs)):
-            for element in range(len(dofs[group])):
-                _add_element(matrix, tangents[group][b, element], dofs[group][element])
+        first, start = 0, 0
+        for width in widths:
+            _add_element(matrix, tangents[b, start:start + width * (width + 1) // 2], unknowns[first:first + width])
+            first, start = first + width, start + width * (width + 1) // 2
         _add_springs(matrix, springs.stiffness[b], springs.places, springs.weights)
         for i in range(n):
             matrix[i, i] += damping[b]
@@ -173,7 +180,7 @@ def _set(bodies, damping, tangents, dofs, springs, store, blas):
         store.modified[body] = _condense(matrix, store.rows[body], store.outer[body], blas)
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _add_element(matrix, tangent, dofs):
     """Add a packed tangent to an upper triangle; several nodes of an element may have the same unknown."""
     first = 0
@@ -192,7 +199,7 @@ def _add_element(matrix, tangent, dofs):
         first += len(dofs) - i
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _add_springs(matrix, stiffness, places, weights):
     for s in range(len(stiffness)):
         if stiffness[s] == 0.0:
@@ -206,7 +213,7 @@ def _add_springs(matrix, stiffness, places, weights):
                     matrix[row, places[s, j]] += stiffness[s] * weights[s, i] * weights[s, j]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _condense(matrix, rows, outer, blas):
     """Fill a body's rows and outer matrix; returns whether its inner matrix was not positive definite."""
     n, m = len(rows), len(outer)
@@ -214,12 +221,16 @@ def _condense(matrix, rows, outer, blas):
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
     one, minus_one = address(factors, 0), address(factors, 1)
     _n, _m, _lead, info = address(size, 0), address(size, 1), address(size, 2), address(size, 3)
-    rows[:] = matrix[:n]
-    outer[:] = matrix[n:, n:]
+    for i in range(n):
+        for j in range(n + m):
+            rows[i, j] = matrix[i, j]
+    for i in range(m):
+        for j in range(m):
+            outer[i, j] = matrix[n + i, n + j]
     call(blas.potrf, (L, _n, rows.ctypes.data, _lead, info))
     modified = size[3] != 0
     if modified:
-        rows[:, :n] = _made_positive(matrix[:n, :n].astype(np.float64))
+        _make_positive_definite(matrix[:n, :n].astype(np.float64), rows)
         call(blas.potrf, (L, _n, rows.ctypes.data, _lead, info))
     coupling = rows[:, n:].ctypes.data
     call(blas.trsm, (R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead))
@@ -231,52 +242,67 @@ def _condense(matrix, rows, outer, blas):
     return modified
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _make_outer_positive(outer, bodies, made, changed, blas):
     """Make the condensed matrices of the indefinite bodies positive definite; a Cholesky factorisation finds these quickly."""
     size = np.array([outer.shape[1], 0], dtype=np.int32)
     lower, count, info = address(blas.letters, 0), address(size, 0), address(size, 1)
     for b in range(len(bodies)):
-        made[b] = outer[bodies[b]]
+        _write(outer[bodies[b]], made[b])
         call(blas.potrf, (lower, count, made[b].ctypes.data, count, info))
         changed[b] = size[1] != 0 and np.isfinite(outer[bodies[b]]).all()
         if changed[b]:
-            made[b] = _made_positive(outer[bodies[b]].astype(np.float64))
+            _make_positive_definite(outer[bodies[b]].astype(np.float64), made[b])
     keep_alive(size)
 
 
-@njit(cache=True, nogil=True)
-def _made_positive(matrix):
+@compiled
+def _make_positive_definite(matrix, out):
+    """Write a matrix (n, n), given by its upper triangle, with the absolute values of its eigenvalues into `out` (n, n or more)."""
     for i in range(len(matrix)):
         for j in range(i):
             matrix[i, j] = matrix[j, i]
     values, vectors = np.linalg.eigh(matrix)
     # The previous layer's contribution may be so stiff near an instability that rounding makes softer modes negative.
     least = max(_SMALLEST_STIFFNESS, len(matrix) * _ROUNDING * np.abs(values).max())
-    return ((vectors * np.maximum(np.abs(values), least)) @ vectors.T).astype(np.float32)
+    _write((vectors * np.maximum(np.abs(values), least)) @ vectors.T, out)
 
 
-@njit(cache=True, nogil=True)
+@compiled
+def _write(matrix, out):
+    """Round a matrix (n, n) into the first columns of `out` (n, n or more)."""
+    for i in range(len(matrix)):
+        for j in range(len(matrix)):
+            out[i, j] = matrix[i, j]
+
+
+@compiled
 def _reduce(rows, bodies, forward_solved, passed_on):
     n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
     for b in range(len(bodies)):
-        whole[:n], whole[n:] = forward_solved[b], 0.0
+        for i in range(len(whole)):
+            whole[i] = forward_solved[b, i] if i < n else 0.0
         for i in range(n):
             row = rows[bodies[b], i]
             whole[i] /= row[i]
             add_row(row[i + 1:], -whole[i], whole[i + 1:])
-        forward_solved[b], passed_on[b] = whole[:n], whole[n:]
+        for i in range(n):
+            forward_solved[b, i] = whole[i]
+        for i in range(n, len(whole)):
+            passed_on[b, i - n] = whole[i]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _recover(rows, bodies, step, outer_step):
     n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
     for b in range(len(bodies)):
-        whole[:n], whole[n:] = step[b], -outer_step[b]
+        for i in range(len(whole)):
+            whole[i] = step[b, i] if i < n else -outer_step[b, i - n]
         for i in range(n - 1, -1, -1):
             row = rows[bodies[b], i]
             whole[i] = (whole[i] - row_product(row[i + 1:], whole[i + 1:])) / row[i]
-        step[b] = whole[:n]
+        for i in range(n):
+            step[b, i] = whole[i]
 
 
 class TangentCache:
@@ -314,19 +340,19 @@ def make_positive(tangents: np.ndarray) -> int:
     return int(_make_positive(tangents, np.empty(tangents.shape[1:], dtype=np.float32), ROUTINES))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _make_positive(tangents, scratch, blas):
     size = np.array([tangents.shape[1], 0], dtype=np.int32)
     lower, count, info, changed = address(blas.letters, 0), address(size, 0), address(size, 1), 0
     for tangent in tangents:
-        scratch[:] = tangent
+        _write(tangent, scratch)
         nothing = _NOTHING * np.abs(np.diag(tangent)).max()
         for i in range(len(tangent)):
             scratch[i, i] += nothing
         call(blas.potrf, (lower, count, scratch.ctypes.data, count, info))
         if size[1] != 0 and np.isfinite(tangent).all():
             values, vectors = np.linalg.eigh(tangent.astype(np.float64))
-            tangent[:] = ((vectors * np.abs(values)) @ vectors.T).astype(np.float32)
+            _write((vectors * np.abs(values)) @ vectors.T, tangent)
             changed += 1
     keep_alive(size)
     return changed

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.contact.height_field import HeightField
 from softtact.imaging.pinhole import Pinhole
 
@@ -84,7 +84,7 @@ class DepthCamera:
         return depth.reshape(self.pinhole.rows, self.pinhole.columns)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _depths(directions, heights, first, spacing, down, distance, deepest):
     """Depths (n,) at which rays (n, 2), mm along x and y for each mm from the pinhole, meet the underside."""
     found = np.zeros(len(directions))
@@ -106,7 +106,7 @@ def _depths(directions, heights, first, spacing, down, distance, deepest):
     return found
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _meets(u, v, depth, heights, first, spacing, down, distance):
     """Whether a ray is within the object at a depth."""
     column = int(np.round((u * (distance - depth) - first[0]) / spacing))

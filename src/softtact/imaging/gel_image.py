@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.imaging.pinhole import Pinhole
 
 _TILTS = 161              # cells' corners of the table over the sine of the surface's angle: bilinear within 0.02 grey levels
@@ -217,14 +217,14 @@ def _slopes_of_tilts(tilt_x, tilt_y):
 # --- compiled loops ---
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _cell(value, count):
     """Number of the cell that a place on a line of `count` points lies in, and the share of the way through it."""
     low = min(max(int(value), 0), count - 2)
     return low, min(max(value - low, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _sample_points(field, grid, points, out):
     for k in range(len(points)):
         i, s = _cell((points[k, 0] - grid[0]) * grid[2], field.shape[1])
@@ -234,7 +234,7 @@ def _sample_points(field, grid, points, out):
                          + t * ((1 - s) * field[j + 1, i, c] + s * field[j + 1, i + 1, c]))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slopes(moved, rest, grid, turn, out):
     ny, nx = moved.shape[:2]
     curved = rest.shape[0] > 1
@@ -259,7 +259,7 @@ def _slopes(moved, rest, grid, turn, out):
             out[j, i, 1] = turn[1, 0] * sx + turn[1, 1] * sy
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _see(rays, moved, fields, grid, distance, steep, out):
     """Search each pixel's point, from that of its left neighbour on, or from the nearest height, and sample the fields there."""
     ny, nx, count = fields.shape
@@ -296,7 +296,7 @@ def _see(rays, moved, fields, grid, distance, steep, out):
                     out[row, column, k] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@compiled(error_model="numpy", fastmath=True)
 def _look_up(tilts, step, table, degree, middle, over_unit, out):
     """Colours minus background (rows, columns, 4) of tilts (rows, columns, 2) at each `step`-th pixel."""
     size, count = table.shape[0], table.shape[2]
@@ -316,7 +316,7 @@ def _look_up(tilts, step, table, degree, middle, over_unit, out):
                                                        + c * table[j + 1, i, m, k] + d * table[j + 1, i + 1, m, k])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@compiled(error_model="numpy", fastmath=True)
 def _colour(difference, step, background, light, image):
     """Colours of all pixels from differences (rows, columns, 4) at each `step`-th, linear between them."""
     over_step, zero, most, round_up = np.float32(1 / step), np.float32(0), np.float32(255), np.float32(0.5)
@@ -340,7 +340,7 @@ def _colour(difference, step, background, light, image):
                     image[row, column, c] = np.uint8(min(max(value, zero), most) * left + round_up)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@compiled(error_model="numpy", inline="always")
 def _place_terms(x, y, degree, out):
     """1, x, y, x2, xy, y2, ... up to the degree, at most 3."""
     out[0] = 1
@@ -352,7 +352,7 @@ def _place_terms(x, y, degree, out):
         out[6], out[7], out[8], out[9] = x * x * x, x * x * y, x * y * y, y * y * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@compiled(error_model="numpy", fastmath=True)
 def _draw_discs(px, back, radius, darkness, edge, light):
     """Darken pixels by discs at px (n, 2), whose places in mm are back (n, 2, 2) times the distance in px from their middle."""
     rows, columns = light.shape

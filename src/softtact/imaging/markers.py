@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from softtact.compiled import compiled
 from softtact.errors import InputError
 from softtact.inputs import check_input, check_limit, in_one_sentence
 
@@ -141,7 +141,7 @@ def _apart(px, height, least):
     return px[kept]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _centroids(dark, places, radius, inner):
     """Centroids (n, 2) of the darkness in circles centred on them, its means (n,) within `inner` of them, its sums (n,)."""
     found, mean, sums = places.copy(), np.zeros(len(places)), np.zeros(len(places))
@@ -160,7 +160,7 @@ def _centroids(dark, places, radius, inner):
     return found, mean, sums
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _moments(dark, x, y, radius):
     """Sum of the darkness in a circle with a soft edge, its moments along columns and rows, and the circle's pixels."""
     total, along, down, area = 0.0, 0.0, 0.0, 0.0

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.linalg import blas, lapack
 
-from softtact.linalg.multifrontal import runs_of
+from softtact.compiled import compiled
+from softtact.linalg.multifrontal import add_to, runs_of
 from softtact.linalg.symbolic import Piece, dissect
 from softtact.linalg.workers import threads_of_blas
 
@@ -36,7 +36,7 @@ def inverse_between(upper: sp.csr_matrix, functionals: sp.csr_matrix, places: np
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _negate_and_mirror(triangle, out):
     """Set `out` (m, m) to the negative of the symmetric matrix whose upper triangle (m, m) is given."""
     for i in range(len(triangle)):
@@ -117,7 +117,7 @@ def _boundary(rows, first, end, of_updates):
     return np.unique(np.concatenate([ranks[ranks >= end] for ranks in (coupled, *of_updates)]))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add_entries(indptr, indices, values, first, end, place, pivots, coupling):
     """Add the matrix' rows from `first` to `end` to a front, in which each unknown has its `place`."""
     count = len(pivots)
@@ -130,25 +130,24 @@ def _add_entries(indptr, indices, values, first, end, place, pivots, coupling):
                 coupling[i, j - count] += values[e]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _extend_add(triangle, place, pivots, coupling, update):
     """Add an earlier piece's update, its upper triangle (c, c), to a front's rows and columns `place` (c,), which rise."""
-    count = len(pivots)
+    count, first = len(pivots), np.int64(0)     # a plain 0 would have numba compile `_add_row` for it alone
     split = np.searchsorted(place, count)
     of_pivots, later = runs_of(place[:split]), split + runs_of(place[split:])
     for i in range(len(place)):
         if i < split:
-            _add_row(triangle[i], place, of_pivots, i, 0, pivots[place[i]])
+            _add_row(triangle[i], place, of_pivots, i, first, pivots[place[i]])
             _add_row(triangle[i], place, later, i, count, coupling[place[i]])
         else:
             _add_row(triangle[i], place, later, i, count, update[place[i] - count])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add_row(row, place, runs, start, skipped, out):
     """Add the entries of a row (c,) from `start` on, run by run of places; `out` begins at the place `skipped`."""
     for r in range(len(runs) - 1):
         first, last = max(runs[r], start), runs[r + 1]
         if first < last:
-            to = place[first] - skipped
-            out[to:to + last - first] += row[first:last]
+            add_to(out[place[first] - skipped:], row[first:last])

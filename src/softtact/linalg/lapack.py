@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import get_cython_function_address, intrinsic
 
+from softtact.compiled import compiled
 from softtact.linalg.workers import SERIAL, Workers, slices
 
 _BLOCK = 384
@@ -59,26 +60,26 @@ def call(typing_context: Any, routine: types.Type, arguments: types.BaseTuple) -
     return types.void(routine, arguments), generate
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def address(array: np.ndarray, place: int) -> np.uintp:
     """Address of an entry of a flat array."""
     return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
 
 
-@njit(cache=True, nogil=True, inline="never")
+@compiled(inline="never")
 def keep_alive(array: np.ndarray) -> np.number:
     """Use an array whose address a routine was given, so that it is not freed before."""
     return array[0]
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@compiled(fastmath=True)
 def add_row(row: np.ndarray, share: float, out: np.ndarray) -> None:
     """Add a share of a row (k,) to `out` (k,)."""
     for j in range(len(row)):
         out[j] += share * np.float32(row[j])
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@compiled(fastmath=True)
 def row_product(row: np.ndarray, x: np.ndarray) -> np.float32:
     """The product of a row (k,) with x (k,)."""
     total = np.float32(0.0)
@@ -99,7 +100,7 @@ def factor_in_place(matrix: np.ndarray, *, workers: Workers = SERIAL) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _factor_diagonal(matrix, start, stop, blas):
     """Factor the diagonal block from `start` to `stop`; False if it is not positive definite."""
     letters = blas.letters
@@ -109,7 +110,7 @@ def _factor_diagonal(matrix, start, stop, blas):
     return size[2] == 0 and np.isfinite(matrix[stop - 1, stop - 1])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _solve_rows(matrix, start, stop, first, end, blas):
     """The factor's rows from `start` to `stop` in the columns from `first` to `end`."""
     letters, factors = blas.letters, blas.factors
@@ -120,7 +121,7 @@ def _solve_rows(matrix, start, stop, first, end, blas):
     keep_alive(size)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _update_rows(matrix, start, stop, first, end, blas):
     """Subtract from the rows from `first` to `end` their product with the factor's rows from `start` to `stop`."""
     letters, factors = blas.letters, blas.factors

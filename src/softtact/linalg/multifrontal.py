@@ -13,8 +13,8 @@ through them row by row, for the reason in `lapack`.
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.linalg.lapack import Routines, add_row, address, call, keep_alive, row_product
 
 # Arrays of all pieces, concatenated: those of piece p go from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
@@ -32,9 +32,10 @@ Fronts = namedtuple("Fronts", "pivot_at boundary_at boundary child_at child plac
 Store = namedtuple("Store", "work triangles short scale")
 
 _LONGEST = 32767                     # number in 16 bits
+_FIRST = np.int64(0)                 # for a plain 0 numba would compile a function once more
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def factor_pieces(pieces: np.ndarray, fronts: Fronts, store: Store, values: np.ndarray, blas: Routines) -> bool:
     """Factor pieces of a matrix, whose values are given, one after the other; False where one is not positive definite.
 
@@ -44,13 +45,13 @@ def factor_pieces(pieces: np.ndarray, fronts: Fronts, store: Store, values: np.n
         if not factor_pivots(p, fronts, store, values, blas):
             return False
         boundary = fronts.boundary_at[p + 1] - fronts.boundary_at[p]
-        solve_columns(p, 0, boundary, fronts, store, blas)
+        solve_columns(p, _FIRST, boundary, fronts, store, blas)
         store_panel(p, fronts, store)
-        update_rows(p, 0, boundary, fronts, store, blas)
+        update_rows(p, _FIRST, boundary, fronts, store, blas)
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def assemble_panel(p: int, fronts: Fronts, store: Store, values: np.ndarray) -> None:
     """Sum up a piece's panel (k, k + b): the matrix' values, and the updates of earlier pieces."""
     pivots, width = _shape(p, fronts)
@@ -59,10 +60,10 @@ def assemble_panel(p: int, fronts: Fronts, store: Store, values: np.ndarray) -> 
     for e in range(fronts.entry_at[p], fronts.entry_at[p + 1]):
         panel[fronts.target[e]] = values[fronts.source[e]]
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        _extend_add(c, 0, pivots, fronts, store, panel, 0, width)
+        _extend_add(c, _FIRST, pivots, fronts, store, panel, _FIRST, width)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def factor_pivots(p: int, fronts: Fronts, store: Store, values: np.ndarray, blas: Routines) -> bool:
     """Assemble a piece's panel and factor the triangle of its pivots; False if that is not positive definite."""
     assemble_panel(p, fronts, store, values)
@@ -76,8 +77,8 @@ def factor_pivots(p: int, fronts: Fronts, store: Store, values: np.ndarray, blas
     return size[2] == 0 and np.isfinite(panel[(pivots - 1) * (width + 1)])
 
 
-@njit(cache=True, nogil=True)
-def solve_columns(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
+@compiled
+def solve_columns(p: int, start: int | np.int64, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
     """Make the panel's boundary columns from `start` to `end` those of the factor."""
     pivots, width = _shape(p, fronts)
     if pivots == 0 or start == end:
@@ -91,7 +92,7 @@ def solve_columns(p: int, start: int, end: int, fronts: Fronts, store: Store, bl
     keep_alive(size)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@compiled(fastmath=True)
 def store_panel(p: int, fronts: Fronts, store: Store) -> None:
     """Store what a solve needs of a panel: the triangle of the pivots, the boundary columns in 16 bits, and each row's unit."""
     pivots, width = _shape(p, fronts)
@@ -99,7 +100,8 @@ def store_panel(p: int, fronts: Fronts, store: Store) -> None:
     triangle, at = _triangle_of(p, fronts, store), 0
     for k in range(pivots):
         triangle[at] = np.float32(1.0) / panel[k * width + k]
-        triangle[at + 1:at + pivots - k] = panel[k * width + k + 1:k * width + pivots]
+        for j in range(1, pivots - k):
+            triangle[at + j] = panel[k * width + k + j]
         at += pivots - k
     for k in range(pivots):
         row = panel[k * width + pivots:(k + 1) * width]
@@ -113,8 +115,8 @@ def store_panel(p: int, fronts: Fronts, store: Store) -> None:
         store.scale[fronts.pivot_at[p] + k] = np.float32(1.0) / per_unit
 
 
-@njit(cache=True, nogil=True)
-def update_rows(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
+@compiled
+def update_rows(p: int, start: int | np.int64, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
     """Compute the update's rows from `start` to `end`."""
     if start == end:
         return
@@ -134,7 +136,7 @@ def update_rows(p: int, start: int, end: int, fronts: Fronts, store: Store, blas
         _extend_add(c, pivots + start, pivots + end, fronts, store, out, pivots, boundary)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _extend_add(c, start, end, fronts, store, out, skipped, width):
     """Add the rows of a piece's update that belong to the rows from `start` to `end` of a front.
 
@@ -147,11 +149,17 @@ def _extend_add(c, start, end, fronts, store, out, skipped, width):
         for r in range(len(runs) - 1):
             first, last = max(runs[r], i), runs[r + 1]
             if first < last:
-                to = row + place[first]
-                out[to:to + last - first] += child_update[i * boundary + first:i * boundary + last]
+                add_to(out[row + place[first]:], child_update[i * boundary + first:i * boundary + last])
 
 
-@njit(cache=True, nogil=True)
+@compiled
+def add_to(out: np.ndarray, values: np.ndarray) -> None:
+    """Add values (k,) to the first of `out`."""
+    for j in range(len(values)):
+        out[j] += values[j]
+
+
+@compiled
 def runs_of(places: np.ndarray) -> np.ndarray:
     """Where runs of consecutive places begin among places (k,), and the end."""
     starts = np.empty(len(places) + 1, np.int64)
@@ -164,7 +172,7 @@ def runs_of(places: np.ndarray) -> np.ndarray:
     return starts[:count + 1]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def forward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray, beyond: np.ndarray, first: int) -> None:
     """Forward substitution with the pieces for a right-hand side (n,), in place.
 
@@ -183,7 +191,7 @@ def forward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray,
                 beyond[boundary[i] - first] -= passed_on[i]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def backward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray) -> None:
     """Back substitution with the pieces from the last on, in place; later unknowns are known."""
     for p in pieces[::-1]:
@@ -194,7 +202,7 @@ def backward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray
         _solve_triangle(_triangle_of(p, fronts, store), x)
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _solve_transposed(triangle, x):
     """Solve R'.y = x (k,) in place for a triangle R, row after row with its diagonal inverted."""
     at = 0
@@ -205,7 +213,7 @@ def _solve_transposed(triangle, x):
         at += rest + 1
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _solve_triangle(triangle, x):
     """Solve R.y = x (k,) in place."""
     at = len(triangle)
@@ -215,42 +223,42 @@ def _solve_triangle(triangle, x):
         x[k] = (x[k] - row_product(triangle[at + 1:at + 1 + rest], x[k + 1:])) * triangle[at]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _shape(p, fronts):
     """Number of a piece's pivots, and of all unknowns of its front."""
     pivots = fronts.pivot_at[p + 1] - fronts.pivot_at[p]
     return pivots, pivots + fronts.boundary_at[p + 1] - fronts.boundary_at[p]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _panel_of(p, fronts, store):
     pivots, width = _shape(p, fronts)
     return store.work[fronts.panel_at[p]:fronts.panel_at[p] + pivots * width]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _update_of(p, fronts, store):
     boundary = fronts.boundary_at[p + 1] - fronts.boundary_at[p]
     return store.work[fronts.update_at[p]:fronts.update_at[p] + boundary * boundary]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _pivots_of(p, fronts, values):
     """The part of values (n,) that belongs to a piece's pivots."""
     return values[fronts.pivot_at[p]:fronts.pivot_at[p + 1]]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _boundary_of(p, fronts, values):
     """The part of values, concatenated as `boundary`, that belongs to a piece's boundary."""
     return values[fronts.boundary_at[p]:fronts.boundary_at[p + 1]]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _short_of(p, fronts, store):
     return store.short[fronts.short_at[p]:fronts.short_at[p + 1]]
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _triangle_of(p, fronts, store):
     return store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]

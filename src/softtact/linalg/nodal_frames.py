@@ -5,7 +5,8 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
+
+from softtact.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class NodeFrames:
         return values
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _turn(indptr, indices, values, frame, turns):
     for row in range(len(indptr) - 1):
         e = indptr[row]
@@ -97,20 +98,23 @@ def _turn(indptr, indices, values, frame, turns):
             _turn_rows(indptr[row], indptr[row + 1], indptr[row + 2], indptr[row + 1] - indptr[row] - 3, values, turns[frame[row]])
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _times(x, y, z, turn):
     return (x * turn[0, 0] + y * turn[1, 0] + z * turn[2, 0], x * turn[0, 1] + y * turn[1, 1] + z * turn[2, 1],
             x * turn[0, 2] + y * turn[1, 2] + z * turn[2, 2])
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _turn_rows(x, y, z, others, values, turn):
     """Turn a node's three rows, which begin at x, y and z with the upper half of the diagonal block, before `others` columns."""
     block = np.empty((3, 3), values.dtype)
-    block[0], block[1, 1:], block[2, 2] = values[x:x + 3], values[y:y + 2], values[z]
-    block[1, 0], block[2, 0], block[2, 1] = block[0, 1], block[0, 2], block[1, 2]
+    for i, row in enumerate((x, y, z)):
+        for j in range(i, 3):
+            block[i, j] = block[j, i] = values[row + j - i]
     block = turn.T @ block @ turn
-    values[x:x + 3], values[y:y + 2], values[z] = block[0], block[1, 1:], block[2, 2]
+    for i, row in enumerate((x, y, z)):
+        for j in range(i, 3):
+            values[row + j - i] = block[i, j]
     for k in range(others):
         a, b, c = x + 3 + k, y + 2 + k, z + 1 + k
         values[a], values[b], values[c] = _times(values[a], values[b], values[c], turn)

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
+from softtact.compiled import compiled
 from softtact.linalg.multifrontal import Fronts
 
 _LEAST_SHARE = 0.1           # of the unknowns, on the smaller side of a cut
@@ -66,7 +66,7 @@ def _graph_of_columns(indptr, indices, column_of, members, member_at):
     return (graph + graph.T).tocsr()
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _neighbours(indptr, indices, column_of, members, member_at):
     """Pairs (e, 2) of columns such that a row of the first has an entry in the second, each pair once."""
     pairs, count, seen = np.empty((len(members), 2), np.int64), 0, np.full(len(member_at) - 1, -1, np.int64)
@@ -78,7 +78,7 @@ def _neighbours(indptr, indices, column_of, members, member_at):
                     seen[other] = column
                     if count == len(pairs):
                         pairs = np.concatenate((pairs, np.empty_like(pairs)))
-                    pairs[count] = column, other
+                    pairs[count, 0], pairs[count, 1] = column, other
                     count += 1
     return pairs[:count]
 
@@ -144,7 +144,7 @@ def least_cover(graph: sp.csr_matrix, beyond: np.ndarray) -> np.ndarray:
     return side
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cover(indptr, indices, matched, columns):
     """The smallest cover of all entries by rows and columns (rows + columns,), from a largest matching (Koenig's theorem)."""
     rows = len(matched)
@@ -259,7 +259,7 @@ def _starts(counts):
     return np.cumsum([0, *counts], dtype=np.int64)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _entries(indptr, indices, bordered, rank, owner, pieces):
     """Numbers of the matrix' entries (e,), piece by piece from `entry_at` (pieces + 1,) on, and the ranks of their two unknowns.
 
@@ -297,7 +297,7 @@ def _boundary(pieces, pivot_at, entry_at, high):
     return boundary
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _later(p, end, high, passed_on, seen):
     """The ranks from `end` on in two lists, each once; `seen` (n,): the last piece that listed a rank."""
     out, count = np.empty(len(seen) - end, np.int64), 0
@@ -321,7 +321,7 @@ def _places_in_parents(pieces, boundary, pivot_at):
     return np.concatenate(places).astype(np.int32)
 
 
-@njit(cache=True)
+@compiled
 def _targets(pivot_at, boundary_at, boundary, entry_at, low, high):
     """Place in its piece's panel of each entry, whose unknowns are `low` and `high`."""
     out, place = np.empty(len(low), np.int32), np.zeros(pivot_at[-1], np.int64)

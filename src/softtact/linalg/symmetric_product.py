@@ -1,8 +1,8 @@
 """Products with a symmetric matrix of which only the upper triangle is stored."""
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.linalg.workers import SERIAL, Workers
 
 
@@ -27,7 +27,7 @@ class SymmetricProduct:
         return one + other
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _rows_alike(indptr, indices):
     """Sizes of groups of consecutive rows: 3 where three rows have the same columns from their diagonals on, in threes; else 1."""
     alike, count, row = np.empty(len(indptr) - 1, np.int8), 0, 0
@@ -44,7 +44,7 @@ def _rows_alike(indptr, indices):
     return alike[:count].copy()
 
 
-@njit(cache=True, nogil=True)
+@compiled(inline="always")
 def _in_threes(columns):
     """Whether columns come in groups of three consecutive numbers."""
     if len(columns) % 3:
@@ -55,7 +55,7 @@ def _in_threes(columns):
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _symmetric_product(indptr, indices, data, row, alike, x):
     """Contribution (n,) of the rows from `row` on and of their mirror images."""
     out = np.zeros(len(x))
@@ -74,7 +74,7 @@ def _symmetric_product(indptr, indices, data, row, alike, x):
     return out
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@compiled(fastmath=True)
 def _add_three_rows(row, indptr, indices, data, x, out):
     # Unsigned indices: for signed ones numba checks whether they count from the end.
     one, two, three = np.uintp(1), np.uintp(2), np.uintp(3)

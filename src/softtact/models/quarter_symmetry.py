@@ -18,8 +18,8 @@ from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.fem.elements import HEX27, dofs_of
 from softtact.fem.solid_block import HexBlock
 from softtact.fem.structured_meshes import with_level
@@ -233,7 +233,7 @@ class ParityBlocks:
         return np.moveaxis(np.concatenate([(even - odd)[:0:-1], even + odd]), -1, 0)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _between(blocks, rows, row_negative, columns, column_negative):
     out = np.empty((len(rows), len(columns)), dtype=blocks.dtype)
     for a in range(len(rows)):

@@ -15,9 +15,9 @@ Here     psi = sum_k 2 mu_k/alpha_k^2 (l_1^alpha_k + l_2^alpha_k + l_3^alpha_k -
 import math
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 
+from softtact.compiled import compiled
 from softtact.errors import InputError
 from softtact.materials.laws.base import TEST_PATHS, IsochoricResponse, Law
 from softtact.materials.laws.stretches import dyads, eigen, quotient, response, sum_dyads
@@ -93,7 +93,7 @@ def _bracket(function):
     return low, high
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _response(C6, mu, alpha, beta, energy, stress, tangent):
     """Fill energy (n,), stress (n, 6) and, unless it is empty, tangent (n, 6, 6); mu, alpha, beta (terms,)."""
     A, V, c, t, h, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -118,7 +118,7 @@ def _response(C6, mu, alpha, beta, energy, stress, tangent):
         sum_dyads(D, Q, N, W, tangent[p])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _principal(c, mu, alpha, beta, t, h):
     """Energy and sum_k 2 mu_k beta_k J^(-alpha_k beta_k); t and, as h, sum_k 2 mu_k l_a^alpha_k (3,) at eigenvalues c (3,) of C."""
     log_J = 0.5 * (math.log(c[0]) + math.log(c[1]) + math.log(c[2]))

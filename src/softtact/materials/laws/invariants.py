@@ -16,8 +16,8 @@ kernels are compiled once for all laws.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.materials.laws.base import IsochoricResponse, Law
 
 ROW = np.array([0, 1, 2, 0, 1, 2])
@@ -73,7 +73,7 @@ def _table(derivatives, n):
     return table
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def isochoric_invariants(C6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Isochoric invariants i1, i2 (n,) of C6 (n, 6); NaN where det C <= 0."""
     n = len(C6)
@@ -87,7 +87,7 @@ def isochoric_invariants(C6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return i1, i2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy", inline="always")
 def _inverse(c, G):
     """Components of C^-1 into G (6,); returns det C."""
     G[0] = c[1] * c[2] - c[4] * c[4]
@@ -102,7 +102,7 @@ def _inverse(c, G):
     return det
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy", inline="always")
 def _inverse_gradient(g, H):
     """H = -dG/dC as (6, 6): H_ijkl = (G_ik G_jl + G_il G_jk)/2, from g (3, 3)."""
     for a in range(6):
@@ -112,7 +112,7 @@ def _inverse_gradient(g, H):
             H[a, b] = 0.5 * (g[i, k] * g[j, m] + g[i, m] * g[j, k])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _stress_and_tangent(C6, table, stress, tangent):
     """Fill stress (n, 6) and, unless it is empty, tangent (n, 6, 6) from C6 (n, 6) and the derivatives (n, 6)."""
     G, M, A, B = np.empty(6), np.empty(6), np.empty(6), np.empty(6)

@@ -15,8 +15,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.materials.laws.base import IsochoricResponse
 from softtact.materials.laws.invariants import COLUMN, ROW
 
@@ -30,7 +30,7 @@ def response(kernel: Callable[..., None], C6: np.ndarray, *constants: np.ndarray
     return IsochoricResponse(energy, stress, moduli if tangent else None)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def eigen(C6: np.ndarray, A: np.ndarray, V: np.ndarray) -> None:
     """Eigenvalues of one symmetric C6 (6,) on the diagonal of A (3, 3), eigenvectors in V's columns: cyclic Jacobi.
 
@@ -50,7 +50,7 @@ def eigen(C6: np.ndarray, A: np.ndarray, V: np.ndarray) -> None:
             _rotate(A, V, ROW[3 + pair], COLUMN[3 + pair])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy", inline="always")
 def _rotate(A, V, p, q):
     """One Jacobi rotation that makes A[p, q] zero."""
     if A[p, q] == 0.0:
@@ -72,7 +72,7 @@ def _rotate(A, V, p, q):
         V[i, q] = sin * vp + cos * vq
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy: np.ndarray, stress: np.ndarray,
                        tangent: np.ndarray) -> None:
     """Fill energy (n,), stress (n, 6) and, unless it is empty, tangent (n, 6, 6); mu, alpha (terms,)."""
@@ -103,7 +103,7 @@ def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy
         sum_dyads(D, quotients, N, W, tangent[p])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def sum_dyads(D: np.ndarray, Q: np.ndarray, N: np.ndarray, W: np.ndarray, out: np.ndarray) -> None:
     """sum_ab D_ab N_aN_a x N_bN_b + sum_a Q_a W_a x W_a into `out` (6, 6); D (3, 3) symmetric, N and W of `dyads`."""
     for k in range(6):
@@ -117,7 +117,7 @@ def sum_dyads(D: np.ndarray, Q: np.ndarray, N: np.ndarray, W: np.ndarray, out: n
             out[m, k] = value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _principal(cb, mu, alpha, dev, h):
     """Energy; dev = g - m and h (3,) at the isochoric eigenvalues cb (3,)."""
     energy, mean = 0.0, 0.0
@@ -135,7 +135,7 @@ def _principal(cb, mu, alpha, dev, h):
     return energy
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def quotient(c: np.ndarray, cb: np.ndarray, dev: np.ndarray, mu: np.ndarray, alpha: np.ndarray, a: int, b: int) -> float:
     """Q_ab = (S_a - S_b)/(c_a - c_b), exact also where c_a = c_b."""
     d = (c[a] - c[b]) / c[b]
@@ -147,7 +147,7 @@ def quotient(c: np.ndarray, cb: np.ndarray, dev: np.ndarray, mu: np.ndarray, alp
     return (slope - dev[b]) / (c[a] * c[b])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def dyads(V: np.ndarray, N: np.ndarray, W: np.ndarray) -> None:
     """N_a N_a as N (3, 6) and N_a N_b + N_b N_a of the pairs 01, 12, 20 as W (3, 6)."""
     for a in range(3):

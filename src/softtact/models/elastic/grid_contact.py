@@ -10,9 +10,9 @@ Both problems alternate, each as exactly as the other one's last change deserves
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from scipy import fft
 
+from softtact.compiled import compiled
 from softtact.contact.coulomb import CoulombSettings, Increment, Relaxation, largest_eigenvalue, solve_in_discs
 from softtact.errors import ConvergenceError
 from softtact.models.elastic.wide_layer import GridOperator
@@ -59,7 +59,7 @@ class Stencil3:
         return _stencil3(fields, *self._weights)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _stencil3(fields, middle, along_x, along_y, corner):
     m, ny, nx = fields.shape
     out = np.empty_like(fields)

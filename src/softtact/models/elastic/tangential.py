@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.contact.node_grid import NodeGrid
 from softtact.files import read_arrays
 from softtact.models.elastic.compliance import confined_modulus, elastic_slab, surface_grid
@@ -111,7 +111,7 @@ class FoldedBlock:
         return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _part(triangle, rows, columns):
     """Rows (r,) and columns (c,) of a symmetric matrix that is given by its lower triangle, row by row."""
     out = np.empty((len(rows), len(columns)), dtype=triangle.dtype)

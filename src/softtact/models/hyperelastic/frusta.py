@@ -14,8 +14,8 @@ The compiled loops run over the contact points of many bodies with the same loca
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.penalty import Contact
@@ -36,7 +36,7 @@ BOARD, SHEET = -1, -2                                     # contact partners of 
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def weighted_component(field: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> np.ndarray:
     """Weighted components (f, p) of nodal fields (f, nodes, 3) at points of nodes (p, k), weights (p, k), axis (p,)."""
     out = np.zeros((field.shape[0], nodes.shape[0]))
@@ -47,7 +47,7 @@ def weighted_component(field: np.ndarray, nodes: np.ndarray, weights: np.ndarray
     return out
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def scatter_contact(force: np.ndarray, magnitude: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> None:
     """Add forces of magnitudes (f, p) at points, given as in `weighted_component`, to nodal forces (f, nodes, 3)."""
     for f in range(force.shape[0]):

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from numba import njit
 
+from softtact.compiled import compiled
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver
 from softtact.linalg.lapack import factor_in_place
@@ -198,7 +198,7 @@ class DissectedContact:
         return matrix, border, float(left[-1, -1]) + slope @ points.indentation_increment**2
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add_points(out, indptr, indices, data, slope):
     """Add the stiffness (p,) of points, whose gaps change with the unknowns by rows (csr), to an upper triangle."""
     for p in range(len(slope)):

@@ -328,7 +328,7 @@ class Slab:
         *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
                         for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]]
         self._number = number.reshape(-1, 3)
-        members, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
+        members, self._top_dofs = [np.ascontiguousarray(number[dofs]) for dofs in [*groups, *cells]], number[top]
         indptr, indices = upper_pattern([*members, self._top_dofs], len(keep))
         self._positions = [upper_positions(indptr, indices, dofs) for dofs in members]
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
