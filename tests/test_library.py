@@ -38,7 +38,7 @@ sys.meta_path.insert(0, NotInstalled())
 
 def python(code, *, cwd=None):
     """What a program in a process of its own says: (exit status, stdout, stderr)."""
-    done = subprocess.run([sys.executable, "-c", code], cwd=cwd, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run([sys.executable, "-c", code], cwd=cwd, capture_output=True, text=True, check=False, timeout=900)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -184,7 +184,7 @@ def wheel(tmp_path_factory):
     for file in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy2(ROOT / file, folder)
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-index", "--no-deps", "--no-build-isolation",
-                    "--wheel-dir", str(folder / "dist"), str(folder)], check=True, timeout=300, env=ALONE)
+                    "--wheel-dir", str(folder / "dist"), str(folder)], check=True, timeout=900, env=ALONE)
     return next((folder / "dist").glob("*.whl"))
 
 
@@ -192,10 +192,10 @@ def wheel(tmp_path_factory):
 def installed(wheel, tmp_path_factory):
     """A fresh environment with the wheel: its own softtact, the packages of this one, and none that an extra brings."""
     folder = tmp_path_factory.mktemp("environment")
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120, env=ALONE)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=900, env=ALONE)
     program = folder / "bin/python"
     subprocess.run([sys.executable, "-m", "pip", "--quiet", "--python", str(program), "install", "--no-index", "--no-deps",
-                    str(wheel)], check=True, timeout=120, env=ALONE)
+                    str(wheel)], check=True, timeout=900, env=ALONE)
     own = next(folder.glob("lib/python*/site-packages"))
     (own / "packages.pth").write_text(sysconfig.get_path("purelib"))
     (own / "sitecustomize.py").write_text(NOT_FOUND.format(names=BROUGHT_BY_EXTRAS))

@@ -69,9 +69,9 @@ def test_a_search_that_was_cut_off_in_a_trial_ends_as_an_undisturbed_one(undistu
 
 
 def search_in_a_process(journal, trials, started=None):
-    """In a process of its own: search; with `started`, the first trial tells that it runs, and lasts for a minute."""
+    """In a process of its own: search; with `started`, the first trial tells that it runs, and lasts for an hour."""
     if started is not None:
-        searching.run_trial = lambda *arguments, **options: started.set() or time.sleep(60)
+        searching.run_trial = lambda *arguments, **options: started.set() or time.sleep(3600)
     search(Path(journal), trials=trials)
 
 
@@ -81,7 +81,7 @@ def test_processes_share_a_search_and_end_with_the_same_table(tmp_path):
     other = spawn.Process(target=search_in_a_process, args=(tmp_path / "search.journal", 8))
     other.start()
     own = search_table(search(tmp_path / "search.journal"))
-    other.join(60)
+    other.join(600)
     assert other.exitcode == 0
     assert own.trial.tolist() == list(range(8)) and set(own.state) <= {"complete", "pruned"}
     pd.testing.assert_frame_equal(search_table(search(tmp_path / "search.journal")), own, check_exact=True)
@@ -93,10 +93,10 @@ def test_the_trial_of_a_process_that_died_is_done_by_the_others(tmp_path):
     started = spawn.Event()
     dying = spawn.Process(target=search_in_a_process, args=(tmp_path / "search.journal", 3, started))
     dying.start()
-    assert started.wait(60)
+    assert started.wait(600)
     threading.Timer(1.0, dying.kill).start()       # while this process is at work or waits
     table = search_table(search(tmp_path / "search.journal", trials=3))
-    dying.join(10)
+    dying.join(600)
     assert dying.exitcode != 0
     assert table.trial.tolist() == [0, 1, 2] and set(table.state) <= {"complete", "pruned"}
 

@@ -121,7 +121,7 @@ def test_a_view_is_rendered_without_a_display(monkeypatch):
 
 
 def test_a_renderer_that_does_not_answer_is_given_up(monkeypatch, capsys):
-    monkeypatch.setattr(render, "_COMMAND", (sys.executable, "-S", "-c", "import time; time.sleep(30)"))
+    monkeypatch.setattr(render, "_COMMAND", (sys.executable, "-S", "-c", "import time; time.sleep(3600)"))
     assert render.rendered([render.View()], timeout_s=0.3) is None
     assert "no answer within 0.3 s" in capsys.readouterr().err
 

@@ -51,7 +51,7 @@ def drawn(folder, text, *, window):
     page.write_text(f"<!doctype html><meta charset=utf-8>{text}")
     subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}",
                     f"--screenshot={picture}", f"--window-size={window[0]},{window[1]}", page.as_uri()],
-                   check=True, capture_output=True, timeout=60)
+                   check=True, capture_output=True, timeout=600)
     return imread(picture)[..., :3].astype(int).transpose(2, 0, 1)
 
 

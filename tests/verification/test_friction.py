@@ -465,7 +465,7 @@ def block_in_calculix(folder):
               "*NODE PRINT, NSET=PLATE_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
               "*NODE PRINT, NSET=RUBBER_NODES, FREQUENCY=1000", "U", "*END STEP"]
     (folder / "block.inp").write_text("\n".join(lines) + "\n")
-    subprocess.run(["ccx", "block"], cwd=folder, capture_output=True, check=True, timeout=300)
+    subprocess.run(["ccx", "block"], cwd=folder, capture_output=True, check=True, timeout=600)
     numbers = [line.split() for line in (folder / "block.dat").read_text().splitlines() if re.match(r"[\s\d.E+-]+$", line)]
     total, = (row for row in numbers if len(row) == 3)
     displacement = np.array([row for row in numbers if len(row) == 4], dtype=float)

@@ -149,7 +149,7 @@ def calculix(design, tissue, way, folder):
               "*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000", "RF", "*NODE PRINT, NSET=MIDDLE, FREQUENCY=1000",
               "U", "*END STEP"]
     (folder / "probe.inp").write_text("\n".join(lines) + "\n")
-    done = subprocess.run(["ccx", "probe"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(["ccx", "probe"], cwd=folder, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stdout[-2000:]
     rows = [line.split() for line in (folder / "probe.dat").read_text().splitlines()]
     (_, down, _), (_, _, sink, _) = ([float(word) for word in row] for row in rows if row and row[-1][-4:-2] in ("E+", "E-")

@@ -5,11 +5,13 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("workflow", "profiles", "config", "src")
+PRESSES = "results/*/presses/*/*/*.nc"
 STUB = f"-S {Path(__file__).with_name('stub_runner.py')}"
 
 
@@ -36,7 +38,7 @@ class Project:
     def snakemake(self, *arguments, check=True, environment=None):
         """Run Snakemake to its end; the completed process with its output."""
         done = subprocess.run(self._command(*arguments), cwd=self.folder, env=self._environment(environment),
-                              text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=240)
+                              text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=900)
         assert done.returncode == 0 or not check, done.stdout
         return done
 
@@ -50,9 +52,16 @@ class Project:
         output = self.snakemake("--dry-run", *arguments).stdout
         return read_plan(output)
 
+    def wait_for(self, count, pattern, *, within_s=600):
+        """Wait until there are so many files whose path in the project follows a pattern."""
+        end = time.monotonic() + within_s
+        while len(list(self.folder.glob(pattern))) < count:
+            assert time.monotonic() < end, f"fewer than {count} files {pattern} after {within_s} s"
+            time.sleep(0.05)
+
     def presses(self):
         """The press files that are there."""
-        return list(self.folder.glob("results/*/presses/*/*/*.nc"))
+        return list(self.folder.glob(PRESSES))
 
     def edit(self, path, old, new):
         """Replace one piece of text in a file of the project."""

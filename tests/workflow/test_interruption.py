@@ -2,10 +2,9 @@
 
 import os
 import signal
-import time
 
 import pytest
-from project import Project
+from project import PRESSES, Project
 
 from softtact.studies.jobs import stages_of
 
@@ -21,19 +20,12 @@ def results(project):
     return {name: content for name, content in named.items() if not name.startswith(skipped)}
 
 
-def wait_for_presses(project, count, *, within_s=60):
-    end = time.monotonic() + within_s
-    while len(project.presses()) < count:
-        assert time.monotonic() < end, f"fewer than {count} presses after {within_s} s"
-        time.sleep(0.05)
-
-
 @pytest.fixture
 def killed(tmp_path):
     """A study whose Snakemake and stages all got SIGKILL among the presses."""
     project = Project.of_sources(tmp_path)
     run = project.start(environment=SLOW_PRESSES)
-    wait_for_presses(project, 3)
+    project.wait_for(3, PRESSES)
     os.killpg(run.pid, signal.SIGKILL)
     run.wait()
     return project
@@ -90,7 +82,7 @@ def test_a_second_run_beside_a_running_one_is_refused(tmp_path):
     project = Project.of_sources(tmp_path)
     run = project.start(environment=SLOW_PRESSES)
     try:
-        wait_for_presses(project, 1)
+        project.wait_for(1, PRESSES)
         os.killpg(run.pid, signal.SIGSTOP)         # at work, however long the second run takes to start
         refused = project.snakemake(check=False)
         assert refused.returncode != 0

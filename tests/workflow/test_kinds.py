@@ -3,7 +3,6 @@
 import importlib.util
 import os
 import signal
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -167,9 +166,7 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_files(case, finished_study,
     project = Project.of_sources(tmp_path)
     project.configfile = case.config
     run = project.start(environment={"SOFTTACT_STUB_WAIT_S": "0.5", "SOFTTACT_STUB_SLOW": f"{case.kind}.{case.slow}"})
-    end = time.monotonic() + 120
-    while not list(project.folder.glob("results/*/*/**/*.*")) and time.monotonic() < end:
-        time.sleep(0.05)
+    project.wait_for(1, "results/*/*/**/*.*")
     os.killpg(run.pid, signal.SIGKILL)
     run.wait()
     project.snakemake()
