@@ -8,7 +8,7 @@ from pathlib import Path
 from softtact.errors import InputError
 from softtact.files import read_yaml
 from softtact.outputs import held
-from softtact.studies.code_closure import code_closure
+from softtact.studies.code_closure import code_closure, code_digest
 from softtact.studies.cost import cost_lines, origin_of, read_costs
 from softtact.studies.jobs import stage_source, stages_of
 from softtact.studies.registry import checked_study
@@ -34,10 +34,17 @@ os.environ.setdefault("SOFTTACT_RUNNER", "-m softtact.studies")
 os.environ["SOFTTACT_WORKFLOW"] = str(os.getpid())  # a stage ends with this process, also if it is killed
 
 
-def code(stage):
-    """The source files whose edit is a reason to run a stage again: those of this folder, where it has them."""
+def code_files(stage):
+    """The source files that a stage runs: those of this folder, where it has them."""
     source = Path("src")
     return code_closure(stage_source(f"{KIND}.{stage}", source=source), source=source) if (source / "softtact").exists() else []
+
+
+def code(stage):
+    """Digest of the source files that a stage runs, a parameter of its rule: an edit is a reason to run it again, a checkout that
+    changes their dates alone is none."""
+    source = Path("src")
+    return code_digest(stage_source(f"{KIND}.{stage}", source=source), source=source) if (source / "softtact").exists() else ""
 
 
 def log_of(stage, part="all"):
@@ -60,9 +67,8 @@ def run_stage(stage):
 
 
 def files(wildcards, input, output):
-    """A job's named inputs and outputs as the runner takes them; `code` is a reason to run, not an input."""
-    named = {key: paths for key, paths in input.items() if key != "code"}
-    return _arguments("--in", named) + _arguments("--out", dict(output.items()))
+    """A job's named inputs and outputs as the runner takes them."""
+    return _arguments("--in", dict(input.items())) + _arguments("--out", dict(output.items()))
 
 
 def _arguments(option, named):

@@ -3,7 +3,6 @@
 
 rule press_on_glass:
     input:
-        code=code("press_on_glass"),
         card=card_of("dielectric"),
     output:
         state=f"{RESULTS}/ftir/contact_state.nc",
@@ -16,6 +15,7 @@ rule press_on_glass:
         mem_mb=lambda wildcards, attempt: 3000 * attempt,
         runtime=60,
     params:
+        code=code("press_on_glass"),
         files=files,
         settings=as_settings(
             sensor=STUDY.sensor,
@@ -28,7 +28,6 @@ rule press_on_glass:
 
 rule detect_discs:
     input:
-        code=code("detect_discs"),
         states=[rules.press_on_glass.output.virtual],
     output:
         images=directory(f"{RESULTS}/ftir/images"),
@@ -38,6 +37,7 @@ rule detect_discs:
     benchmark:
         benchmark_of("detect_discs")
     params:
+        code=code("detect_discs"),
         files=files,
         settings=as_settings(camera=plain(STUDY.values.ftir.camera), seed=STUDY.values.seed),
     shell:
@@ -47,7 +47,6 @@ rule detect_discs:
 rule validate_ftir:
     input:
         **({"measured": STUDY.values.ftir.measured} if STUDY.values.ftir.measured else {}),
-        code=code("validate_ftir"),
         state=rules.press_on_glass.output.state,
         virtual=rules.press_on_glass.output.virtual,
         discs=[rules.detect_discs.output.discs],
@@ -60,6 +59,7 @@ rule validate_ftir:
     benchmark:
         benchmark_of("validate_ftir")
     params:
+        code=code("validate_ftir"),
         files=files,
         settings=as_settings(pixel_mm=STUDY.values.ftir.camera.pixel_mm),
     shell:

@@ -58,7 +58,6 @@ for _stage in JOBS:
             _stage
         input:
             unpack(inputs_of(_stage)),
-            code=code(_stage),
         output:
             **outputs_of(_stage),
         log:
@@ -72,6 +71,7 @@ for _stage in JOBS:
         resources:
             **RESOURCES.get(_stage, {}),
         params:
+            code=code(_stage),
             files=files,
             settings=settings_of(_stage),
         shell:

@@ -52,7 +52,6 @@ OWN = STUDY.values.network.architecture
 rule build_dataset:
     input:
         **samples_of(),
-        code=code("build_dataset"),
     output:
         **{split: dataset(split, STUDY.learnt_from) for split in SPLITS},
         manifest=f"{RESULTS}/dataset/manifest.csv",
@@ -61,6 +60,7 @@ rule build_dataset:
     benchmark:
         benchmark_of("build_dataset")
     params:
+        code=code("build_dataset"),
         files=files,
         settings=as_settings(
             models=STUDY.learnt_from,
@@ -74,7 +74,6 @@ rule build_dataset:
 
 rule search_hyperparameters:
     input:
-        code=code("search_hyperparameters"),
         train=f"{RESULTS}/dataset/{{model}}/train.nc",
         validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
     output:
@@ -89,6 +88,7 @@ rule search_hyperparameters:
         mem_mb=lambda wildcards, attempt: 4000 * attempt,
         runtime=720,
     params:
+        code=code("search_hyperparameters"),
         files=files,
         settings=as_settings(
             search=plain(STUDY.values.search),
@@ -104,7 +104,6 @@ rule search_hyperparameters:
 
 rule find_learning_rate:
     input:
-        code=code("find_learning_rate"),
         train=f"{RESULTS}/dataset/{{model}}/train.nc",
         validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
     output:
@@ -116,6 +115,7 @@ rule find_learning_rate:
         benchmark_of("find_learning_rate", "{model}")
     threads: STUDY.values.training.threads
     params:
+        code=code("find_learning_rate"),
         files=files,
         settings=as_settings(
             training=STUDY.values.training.model_dump(mode="json", exclude={"threads", "epochs", "patience", "learning_rate"}),
@@ -131,7 +131,6 @@ rule find_learning_rate:
 rule train_cnn:
     input:
         **rate_file(OWN),
-        code=code("train_cnn"),
         train=f"{RESULTS}/dataset/{{model}}/train.nc",
         validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
         best=f"{RESULTS}/learning/{{model}}/best.json",
@@ -148,6 +147,7 @@ rule train_cnn:
         mem_mb=lambda wildcards, attempt: 4000 * attempt,
         runtime=720,
     params:
+        code=code("train_cnn"),
         files=files,
         settings=as_settings(
             training=STUDY.values.training.model_dump(mode="json", exclude={"threads"}),
@@ -163,7 +163,6 @@ rule train_cnn:
 rule train_beside:
     input:
         **rate_file(BESIDE),
-        code=code("train_cnn"),
         train=f"{RESULTS}/dataset/{{model}}/train.nc",
         validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
         best=f"{RESULTS}/learning/{{model}}/best.json",
@@ -180,6 +179,7 @@ rule train_beside:
         mem_mb=lambda wildcards, attempt: 4000 * attempt,
         runtime=720,
     params:
+        code=code("train_cnn"),
         files=files,
         settings=as_settings(
             training=STUDY.values.training.model_dump(mode="json", exclude={"threads"}),
@@ -195,7 +195,6 @@ rule train_beside:
 rule evaluate:
     input:
         **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
-        code=code("evaluate"),
         networks=[f"{RESULTS}/learning/{model}/model.pt" for model in STUDY.tested],
         validation=dataset("validation"),
         unseen=dataset("unseen"),
@@ -212,6 +211,7 @@ rule evaluate:
     benchmark:
         benchmark_of("evaluate")
     params:
+        code=code("evaluate"),
         files=files,
         settings=as_settings(ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     shell:
@@ -221,7 +221,6 @@ rule evaluate:
 rule score_baselines:
     input:
         **{split: dataset(split) for split in SPLITS},
-        code=code("score_baselines"),
     output:
         baselines=f"{RESULTS}/evaluation/baselines.csv",
         taxels=f"{RESULTS}/evaluation/taxels.csv",
@@ -230,6 +229,7 @@ rule score_baselines:
     benchmark:
         benchmark_of("score_baselines")
     params:
+        code=code("score_baselines"),
         files=files,
         settings=as_settings(
             sensor=STUDY.sensor,
@@ -242,7 +242,6 @@ rule score_baselines:
 
 rule compare_networks:
     input:
-        code=code("compare_networks"),
         networks=learned("model.pt"),
         timings=learned("timing.csv"),
         histories=learned("history.csv"),
@@ -261,6 +260,7 @@ rule compare_networks:
     benchmark:
         benchmark_of("compare_networks")
     params:
+        code=code("compare_networks"),
         files=files,
         settings=as_settings(architecture=OWN, ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     shell:
@@ -271,7 +271,6 @@ rule learning_curve:
     input:
         unpack(curve_files),
         **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
-        code=code("learning_curve"),
     output:
         curve=f"{RESULTS}/learning/{{model}}/learning_curve.csv",
     log:
@@ -283,6 +282,7 @@ rule learning_curve:
         mem_mb=lambda wildcards, attempt: 4000 * attempt,
         runtime=720,
     params:
+        code=code("learning_curve"),
         files=files,
         settings=lambda w: as_settings(
             learning_curve=plain(CURVE) | {"networks": curve_networks(w.model)},
@@ -300,7 +300,6 @@ rule repeat_learning:
     input:
         unpack(lambda wildcards: found_files(wildcards, STUDY.values.learning.networks)),
         **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
-        code=code("repeat_learning"),
     output:
         seeds=f"{RESULTS}/learning/{{model}}/seeds.csv",
     log:
@@ -312,6 +311,7 @@ rule repeat_learning:
         mem_mb=lambda wildcards, attempt: 4000 * attempt,
         runtime=720,
     params:
+        code=code("repeat_learning"),
         files=files,
         settings=as_settings(
             repeats=plain(STUDY.values.learning),
@@ -329,7 +329,6 @@ if SEEDS:
 
     rule gather_seeds:
         input:
-            code=code("gather_seeds"),
             seeds=SEEDS,
         output:
             table=shown(f"{RESULTS}/tables/seeds.csv"),
@@ -338,6 +337,7 @@ if SEEDS:
         benchmark:
             benchmark_of("gather_seeds")
         params:
+            code=code("gather_seeds"),
             files=files,
             settings=as_settings(),
         shell:
@@ -348,7 +348,6 @@ if CURVES:
 
     rule find_limits:
         input:
-            code=code("find_limits"),
             curves=CURVES,
             networks=rules.compare_networks.output.networks,
         output:
@@ -358,6 +357,7 @@ if CURVES:
         benchmark:
             benchmark_of("find_limits")
         params:
+            code=code("find_limits"),
             files=files,
             settings=as_settings(
                 architecture=STUDY.values.network.architecture,
@@ -373,7 +373,6 @@ if STUDY.virtual:
 
     rule compare_gains:
         input:
-            code=code("compare_gains"),
             references=[f"{RESULTS}/presses/grasps/{item}/{STUDY.values.reference}.nc" for item in STUDY.items_of["grasps"]],
             presses=[f"{RESULTS}/presses/grasps/{item}/{model}.nc" for model in STUDY.tested for item in STUDY.items_of["grasps"]],
         output:
@@ -383,6 +382,7 @@ if STUDY.virtual:
         benchmark:
             benchmark_of("compare_gains")
         params:
+            code=code("compare_gains"),
             files=files,
             settings=as_settings(
                 sensor=STUDY.sensor,

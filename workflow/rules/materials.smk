@@ -3,7 +3,6 @@
 
 rule make_curves:
     input:
-        code=code("make_curves"),
         measured=lambda w: STUDY.materials[w.material].measured_files,
     output:
         curves=f"{RESULTS}/curves/{{material}}/{{mode}}.csv",
@@ -12,6 +11,7 @@ rule make_curves:
     benchmark:
         benchmark_of("make_curves", "{material}/{mode}")
     params:
+        code=code("make_curves"),
         files=files,
         settings=lambda w: as_settings(**STUDY.materials[w.material].curve_settings),
     shell:
@@ -20,7 +20,6 @@ rule make_curves:
 
 rule fit_material:
     input:
-        code=code("fit_material"),
         curves=lambda w: [f"{RESULTS}/curves/{w.material}/{mode}.csv" for mode in STUDY.materials[w.material].modes],
     output:
         card=f"{RESULTS}/materials/{{material}}.json",
@@ -29,6 +28,7 @@ rule fit_material:
     benchmark:
         benchmark_of("fit_material", "{material}")
     params:
+        code=code("fit_material"),
         files=files,
         settings=lambda w: as_settings(**STUDY.materials[w.material].fit_settings),
     shell:
@@ -37,7 +37,6 @@ rule fit_material:
 
 rule draw_material:
     input:
-        code=code("draw_material"),
         card=rules.fit_material.output.card,
         curves=rules.fit_material.input.curves,
     output:
@@ -48,6 +47,7 @@ rule draw_material:
     benchmark:
         benchmark_of("draw_material", "{material}")
     params:
+        code=code("draw_material"),
         files=files,
         settings=as_settings(),
     shell:

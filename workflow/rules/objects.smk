@@ -3,7 +3,6 @@
 
 rule score_complexity:
     input:
-        code=code("score_complexity"),
         meshes=[item.file for item in STUDY.items()],
     output:
         table=f"{RESULTS}/objects/complexity.csv",
@@ -12,6 +11,7 @@ rule score_complexity:
     benchmark:
         benchmark_of("score_complexity")
     params:
+        code=code("score_complexity"),
         files=files,
         settings=as_settings(
             objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in STUDY.items()],

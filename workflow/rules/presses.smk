@@ -8,7 +8,6 @@ TOLD = f"echo \"presses: $(find {RESULTS}/presses -name '[!.]*.nc' | wc -l) of {
 rule simulate_press:
     input:
         unpack(model_files),
-        code=code("simulate_press"),
         object=lambda w: STUDY.items_of[w.set][w.item].file,
     output:
         press=f"{RESULTS}/presses/{{set}}/{{item}}/{{model}}.nc",
@@ -21,6 +20,7 @@ rule simulate_press:
         mem_mb=lambda wildcards, attempt: 3000 * attempt,
         runtime=120,
     params:
+        code=code("simulate_press"),
         files=files,
         settings=lambda w: pressed_with(w.model, [STUDY.items_of[w.set][w.item]], STUDY.values.forces_n),
     shell:
@@ -38,7 +38,6 @@ for _model in STUDY.pressed_with:
                 rule_name("simulate_presses", _model, _first)
             input:
                 **needs_of(_model),
-                code=code("simulate_presses"),
                 object=_items[0].file,
             output:
                 press=[f"{RESULTS}/presses/{_item.set}/{_item.id}/{_model}.nc" for _item in _items],
@@ -48,6 +47,7 @@ for _model in STUDY.pressed_with:
                 benchmark_of("simulate_presses", f"{_first}/{_model}")
             threads: 1
             params:
+                code=code("simulate_presses"),
                 files=files,
                 settings=pressed_with(_model, _items, STUDY.values.forces_n),
             shell:
@@ -61,7 +61,6 @@ FIRST = next(iter(STUDY.items_of["grasps"].values()))
 rule repeat_press:
     input:
         unpack(model_files),
-        code=code("simulate_press"),
         object=FIRST.file,
     output:
         press=f"{RESULTS}/repeated/{{model}}.nc",
@@ -71,6 +70,7 @@ rule repeat_press:
         benchmark_of("repeat_press", "{model}")
     threads: 1
     params:
+        code=code("simulate_press"),
         files=files,
         settings=lambda w: pressed_with(w.model, [FIRST], STUDY.values.forces_n),
     shell:
@@ -81,7 +81,6 @@ if STUDY.virtual:
 
     rule read_virtual_sensor:
         input:
-            code=code("read_virtual_sensor"),
             press=f"{RESULTS}/presses/{{set}}/{{item}}/{STUDY.values.reference}.nc",
         output:
             tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
@@ -90,6 +89,7 @@ if STUDY.virtual:
         benchmark:
             benchmark_of("read_virtual_sensor", "{set}/{item}")
         params:
+            code=code("read_virtual_sensor"),
             files=files,
             settings=lambda w: as_settings(
                 sensor=STUDY.sensor,
@@ -104,7 +104,6 @@ else:
 
     rule read_recordings:
         input:
-            code=code("read_recordings"),
             recordings=lambda w: [one.file for one in STUDY.recordings[f"{w.set}/{w.item}"]],
             force_logs=lambda w: [one.force_log for one in STUDY.recordings[f"{w.set}/{w.item}"]],
         output:
@@ -115,6 +114,7 @@ else:
             benchmark_of("read_recordings", "{set}/{item}")
         priority: 1  # before the presses: an unusable recording is refused in the first minute
         params:
+            code=code("read_recordings"),
             files=files,
             settings=lambda w: as_settings(
                 sensor=STUDY.sensor,
@@ -131,7 +131,6 @@ else:
 rule press_section:
     input:
         **needs_of(STUDY.values.choice.models["hyperelastic"]),
-        code=code("press_section"),
         object=STUDY.section_item.file,
     output:
         body=f"{RESULTS}/section/pressed_sensor.vtu",
@@ -141,6 +140,7 @@ rule press_section:
     benchmark:
         benchmark_of("press_section")
     params:
+        code=code("press_section"),
         files=files,
         settings=pressed_with(STUDY.values.choice.models["hyperelastic"], [STUDY.section_item], [STUDY.values.section.force_n]),
     shell:

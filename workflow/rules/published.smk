@@ -3,7 +3,6 @@
 
 rule import_published:
     input:
-        code=code("import_published"),
         files=[str(file.path) for file in STUDY.archive.files()],
     output:
         presses=directory(f"{RESULTS}/presses"),
@@ -17,6 +16,7 @@ rule import_published:
     benchmark:
         benchmark_of("import_published")
     params:
+        code=code("import_published"),
         files=files,
         settings=as_settings(
             **STUDY.values.data.model_dump(mode="json", exclude={"source", "recordings"}),

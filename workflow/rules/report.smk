@@ -20,7 +20,6 @@ if not STUDY.archive:
 
     rule measure_features:
         input:
-            code=code("measure_features"),
             objects=[item.file for item in GRASPS],
             presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.learnt_from],
         output:
@@ -30,6 +29,7 @@ if not STUDY.archive:
         benchmark:
             benchmark_of("measure_features")
         params:
+            code=code("measure_features"),
             files=files,
             settings=as_settings(
                 objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in GRASPS],
@@ -50,7 +50,6 @@ rule make_tables:
                 "repeated": [f"{RESULTS}/repeated/{model}.nc" for model in STUDY.tested],
             }
         ),
-        code=code("make_tables"),
         cards=[f"{RESULTS}/materials/{name}.json" for name in STUDY.values.materials],
         complexity=rules.score_complexity.output.table,
         ftir=rules.validate_ftir.output.summary,
@@ -73,6 +72,7 @@ rule make_tables:
     benchmark:
         benchmark_of("make_tables")
     params:
+        code=code("make_tables"),
         files=files,
         settings=as_settings(
             **plain(STUDY.values.complexity),
@@ -89,7 +89,6 @@ if not STUDY.archive:
 
     rule draw_fig2_section:
         input:
-            code=code("draw_fig2_section"),
             body=rules.press_section.output.body,
             summary=rules.press_section.output.summary,
             object=STUDY.section_item.file,
@@ -100,6 +99,7 @@ if not STUDY.archive:
         benchmark:
             benchmark_of("draw_fig2_section")
         params:
+            code=code("draw_fig2_section"),
             files=files,
             settings=as_settings(sensor=STUDY.sensor, unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
         shell:
@@ -107,7 +107,6 @@ if not STUDY.archive:
 
     rule draw_pressed_sensor:
         input:
-            code=code("draw_pressed_sensor"),
             body=rules.press_section.output.body,
             summary=rules.press_section.output.summary,
             object=STUDY.section_item.file,
@@ -118,6 +117,7 @@ if not STUDY.archive:
         benchmark:
             benchmark_of("draw_pressed_sensor")
         params:
+            code=code("draw_pressed_sensor"),
             files=files,
             settings=as_settings(unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
         shell:
@@ -126,7 +126,6 @@ if not STUDY.archive:
 
 rule draw_fig4_complexity:
     input:
-        code=code("draw_fig4_complexity"),
         complexity=rules.score_complexity.output.table,
         objects=[item.file for item in GRASPS],
     output:
@@ -136,6 +135,7 @@ rule draw_fig4_complexity:
     benchmark:
         benchmark_of("draw_fig4_complexity")
     params:
+        code=code("draw_fig4_complexity"),
         files=files,
         settings=as_settings(
             thresholds=plain(STUDY.values.complexity)["thresholds"],
@@ -150,7 +150,6 @@ rule draw_fig4_complexity:
 rule compare_policies:
     input:
         **{kind: presses([model]) for kind, model in STUDY.values.choice.models.items()},
-        code=code("compare_policies"),
         complexity=rules.score_complexity.output.table,
     output:
         presses=f"{RESULTS}/choice/presses.csv",
@@ -161,6 +160,7 @@ rule compare_policies:
     benchmark:
         benchmark_of("compare_policies")
     params:
+        code=code("compare_policies"),
         files=files,
         settings=as_settings(sensor=STUDY.sensor, tolerances_mm=STUDY.values.choice.tolerances_mm),
     shell:
@@ -169,7 +169,6 @@ rule compare_policies:
 
 rule draw_fig5_ftir:
     input:
-        code=code("draw_fig5_ftir"),
         area=rules.validate_ftir.output.area,
         orientations=rules.validate_ftir.output.orientations,
         summary=rules.validate_ftir.output.summary,
@@ -180,6 +179,7 @@ rule draw_fig5_ftir:
     benchmark:
         benchmark_of("draw_fig5_ftir")
     params:
+        code=code("draw_fig5_ftir"),
         files=files,
         settings=as_settings(),
     shell:
@@ -188,7 +188,6 @@ rule draw_fig5_ftir:
 
 rule draw_fig6_ssim:
     input:
-        code=code("draw_fig6_ssim"),
         ssim=rules.evaluate.output.ssim,
         ceiling=rules.evaluate.output.ceiling,
         baselines=rules.score_baselines.output.baselines,
@@ -199,6 +198,7 @@ rule draw_fig6_ssim:
     benchmark:
         benchmark_of("draw_fig6_ssim")
     params:
+        code=code("draw_fig6_ssim"),
         files=files,
         settings=as_settings(ssim=plain(STUDY.values.ssim)),
     shell:
@@ -207,7 +207,6 @@ rule draw_fig6_ssim:
 
 rule draw_fig7_maps:
     input:
-        code=code("draw_fig7_maps"),
         predictions=rules.evaluate.output.predictions,
         complexity=rules.score_complexity.output.table,
         objects=[item.file for item in SHOWN],
@@ -219,6 +218,7 @@ rule draw_fig7_maps:
     benchmark:
         benchmark_of("draw_fig7_maps")
     params:
+        code=code("draw_fig7_maps"),
         files=files,
         settings=as_settings(
             units=[(item.id, item.unit) for item in SHOWN],
@@ -231,7 +231,6 @@ rule draw_fig7_maps:
 
 rule draw_fig8_policies:
     input:
-        code=code("draw_fig8_policies"),
         policies=rules.compare_policies.output.policies,
         presses=rules.compare_policies.output.presses,
     output:
@@ -241,6 +240,7 @@ rule draw_fig8_policies:
     benchmark:
         benchmark_of("draw_fig8_policies")
     params:
+        code=code("draw_fig8_policies"),
         files=files,
         settings=as_settings(),
     shell:
@@ -249,7 +249,6 @@ rule draw_fig8_policies:
 
 rule draw_fig9_networks:
     input:
-        code=code("draw_fig9_networks"),
         networks=rules.compare_networks.output.networks,
         histories=learned("history.csv"),
     output:
@@ -259,6 +258,7 @@ rule draw_fig9_networks:
     benchmark:
         benchmark_of("draw_fig9_networks")
     params:
+        code=code("draw_fig9_networks"),
         files=files,
         settings=as_settings(ssim=plain(STUDY.values.ssim)),
     shell:
@@ -269,7 +269,6 @@ if CURVES:
 
     rule draw_fig10_learning_curve:
         input:
-            code=code("draw_fig10_learning_curve"),
             curves=CURVES,
             ceiling=rules.evaluate.output.ceiling,
         output:
@@ -279,6 +278,7 @@ if CURVES:
         benchmark:
             benchmark_of("draw_fig10_learning_curve")
         params:
+            code=code("draw_fig10_learning_curve"),
             files=files,
             settings=as_settings(),
         shell:
@@ -295,16 +295,15 @@ def drawn_by(stage):
     """The source files that a figure's page links to: its stage, and what that draws with."""
     files = [
         path
-        for path in code(stage)
+        for path in code_files(stage)
         if ("/reporting/" in path or "/figures/" in path) and not path.endswith(("/style.py", "/render.py"))
     ]
     return [code_file(stage), *files]
 
 
 def data_of(rule):
-    """What a rule without wildcards reads, its code left out."""
-    named = [paths for key, paths in rule.input.items() if key != "code"]
-    return [path for paths in named for path in ([paths] if isinstance(paths, str) else paths)]
+    """What a rule without wildcards reads."""
+    return [path for _, paths in rule.input.items() for path in ([paths] if isinstance(paths, str) else paths)]
 
 
 def data_of_material(name):
@@ -330,8 +329,7 @@ rule report:
             else {"policies": rules.compare_policies.output.policies}
         ),
         **({"gains": rules.compare_gains.output.gains} if STUDY.virtual else {}),
-        code=code("report"),
-        sources=sorted({path for stage in STAGES for path in code(stage)}),
+        sources=sorted({path for stage in STAGES for path in code_files(stage)}),
         table1=rules.make_tables.output.table1,
         contradictions=rules.make_tables.output.contradictions,
         table2=rules.make_tables.output.table2,
@@ -361,6 +359,7 @@ rule report:
     benchmark:
         benchmark_of("report")
     params:
+        code=code("report"),
         files=files,
         settings=as_settings(
             study=STUDY.name,

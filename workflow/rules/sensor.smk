@@ -2,8 +2,6 @@
 
 
 rule mesh_sensor:
-    input:
-        code=code("mesh_sensor"),
     output:
         mesh=f"{RESULTS}/sensor/{{model}}/mesh.vtu",
     log:
@@ -11,6 +9,7 @@ rule mesh_sensor:
     benchmark:
         benchmark_of("mesh_sensor", "{model}")
     params:
+        code=code("mesh_sensor"),
         files=files,
         settings=lambda w: as_settings(
             sensor=STUDY.sensor, model=w.model, kind=STUDY.values.models[w.model].kind, mesh=mesh_of(w.model)
@@ -21,7 +20,6 @@ rule mesh_sensor:
 
 rule frustum_law:
     input:
-        code=code("frustum_law"),
         card_dielectric=card_of("dielectric"),
     output:
         law=f"{RESULTS}/sensor/{{model}}/frustum_law.npz",
@@ -30,6 +28,7 @@ rule frustum_law:
     benchmark:
         benchmark_of("frustum_law", "{model}")
     params:
+        code=code("frustum_law"),
         files=files,
         settings=lambda w: as_settings(
             sensor=STUDY.sensor, law=STUDY.values.models[w.model].laws.get("dielectric"), mesh=mesh_of(w.model)
@@ -41,7 +40,6 @@ rule frustum_law:
 rule precompute_compliance:
     input:
         unpack(compliance_files),
-        code=code("precompute_compliance"),
     output:
         compliance=f"{RESULTS}/sensor/{{model}}/compliance.npz",
     log:
@@ -53,6 +51,7 @@ rule precompute_compliance:
         mem_mb=lambda wildcards, attempt: 3000 * attempt,
         runtime=60,
     params:
+        code=code("precompute_compliance"),
         files=files,
         settings=lambda w: as_settings(
             sensor=STUDY.sensor, kind=STUDY.values.models[w.model].kind, laws=STUDY.values.models[w.model].laws

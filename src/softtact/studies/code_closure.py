@@ -1,7 +1,7 @@
 """The source files that a stage runs: the transitive closure of its static imports inside `src/`.
 
-Snakemake does not notice an edit inside an imported package. So every rule lists the closure of its stage as an input, and an
-edit reruns just the stages that import the edited file. A study that runs without Snakemake stores the closure's hash.
+Snakemake does not notice an edit inside an imported package. So the digest of its stage's closure is a parameter of every rule,
+and an edit reruns just the stages that import the edited file. A study that runs without Snakemake stores the same digest.
 """
 
 import ast
