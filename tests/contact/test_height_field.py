@@ -56,3 +56,15 @@ def test_a_height_field_that_has_moved_is_that_of_the_moved_object():
     lowest = [field.lowest_over([1, -1], [2, 0]) for field in (HeightField(mesh).moved(way), HeightField(moved))]
     assert lowest[0] == pytest.approx(lowest[1])
     assert HeightField(mesh).moved(way).lowest_mm == pytest.approx(HeightField(moved).lowest_mm)
+
+
+def test_thin_triangles_are_found_wherever_they_reach_and_stand_in_few_bins():
+    """A tilted disc of 300 slivers: the same bits as if each point looked at all of them."""
+    disc = trimesh.creation.cylinder(5.0, 4.0, sections=300)
+    disc.apply_transform(trimesh.transformations.rotation_matrix(0.2, (1, 0.3, 0)))
+    field, rng = HeightField(disc), np.random.default_rng(0)
+    corners = field.triangles.reshape(-1, 3)
+    x, y = np.concatenate([rng.uniform(-5.2, 5.2, (3000, 2)), corners[:, :2]]).T
+    alone = HeightField(disc, bins=1)
+    assert np.array_equal(field(x, y)[0], alone(x, y)[0])
+    assert len(field._members) < 6 * 128 * 128     # their boxes fill ten times as many

@@ -160,25 +160,45 @@ def _fill_bins(triangles, origin, size, bins):
         return np.zeros(bins * bins + 1, dtype=np.int64), np.zeros(0, dtype=np.int64)
     low = np.clip(((triangles[..., :2].min(axis=1) - 1e-9 - origin) / size).astype(int), 0, bins - 1)
     high = np.clip(((triangles[..., :2].max(axis=1) + 1e-9 - origin) / size).astype(int), 0, bins - 1)
-    return _listed(low, high, bins)
+    return _listed(low, high, triangles, origin, size, bins)
 
 
 @compiled
-def _listed(low, high, bins):
-    """Which boxes of bins, from low to high (t, 2), cover each bin: starts (bins^2 + 1,), members in rising order."""
+def _listed(low, high, triangles, origin, size, bins):
+    """Which triangles, in boxes of bins from low to high (t, 2), reach into each bin: starts (bins^2 + 1,), rising members."""
     starts = np.zeros(bins * bins + 1, dtype=np.int64)
     for t in range(len(low)):
         for j in range(low[t, 1], high[t, 1] + 1):
             for i in range(low[t, 0], high[t, 0] + 1):
-                starts[j * bins + i + 1] += 1
+                if _reaches(triangles[t], origin, size, i, j):
+                    starts[j * bins + i + 1] += 1
     starts = np.cumsum(starts)
     members, fill = np.empty(starts[-1], dtype=np.int64), starts[:-1].copy()
     for t in range(len(low)):
         for j in range(low[t, 1], high[t, 1] + 1):
             for i in range(low[t, 0], high[t, 0] + 1):
-                members[fill[j * bins + i]] = t
-                fill[j * bins + i] += 1
+                if _reaches(triangles[t], origin, size, i, j):
+                    members[fill[j * bins + i]] = t
+                    fill[j * bins + i] += 1
     return starts, members
+
+
+@compiled
+def _reaches(t, origin, size, i, j):
+    """Whether a triangle (3, 3) reaches into a bin of its box: no side has the whole bin, a little enlarged, beyond it.
+
+    Thin triangles, as of a disc from a CAD program, fill few bins of their boxes.
+    """
+    for k in range(3):
+        a, b, c = t[k], t[(k + 1) % 3], t[(k + 2) % 3]
+        along_x, along_y = b[0] - a[0], b[1] - a[1]
+        double_area = along_x * (c[1] - a[1]) - along_y * (c[0] - a[0])
+        sense = 1.0 if double_area > 0 else -1.0
+        x = origin[0] + size[0] * (i + (1 + 1e-6 if sense * along_y < 0 else -1e-6)) - a[0]     # of the bin's innermost corner
+        y = origin[1] + size[1] * (j + (1 + 1e-6 if sense * along_x > 0 else -1e-6)) - a[1]
+        if sense * (along_x * y - along_y * x) < -1e-6 * abs(double_area):
+            return False
+    return True
 
 
 @compiled
