@@ -17,7 +17,8 @@ from softtact.studies.markers.shapes import generated_object
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-FULL_STICK = 1e3  # friction at which nothing slides
+# Friction at which hardly a point slides, some in a million at the edges of a tetrahedron; with 1000 such edges may not settle.
+FULL_STICK = 10.0
 _FRICTION = {"full_stick": FULL_STICK, "linear_frictionless": 0.0}
 
 
