@@ -53,7 +53,7 @@ def test_a_misspelt_key_is_answered_with_the_nearest_right_one(fresh):
 @pytest.mark.slow
 def test_an_unknown_material_is_refused(fresh):
     said = refusal(fresh, "--config", "materials=[polyurethane,neoprene,neopren]")
-    assert "there is no material 'neopren' (did you mean 'neoprene'?); known are neoprene, polyurethane, silicone" in said
+    assert "there is no material 'neopren' (did you mean 'neoprene'?); known are gel_silicone, neoprene, polyurethane, " in said
 
 
 @pytest.mark.slow
