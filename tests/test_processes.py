@@ -17,7 +17,7 @@ from softtact.commands import mesh as mesh_command
 from softtact.errors import WorkerError
 from softtact.processes import call_apart, map_in_processes
 
-OUTLIVED_S = 20     # after which a process that should be gone says so
+OUTLIVED_S = 120     # after which a process that should be gone says so
 PARENT = f"""
 import os, sys, time
 from softtact import processes

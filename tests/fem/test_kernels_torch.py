@@ -94,6 +94,12 @@ def test_an_element_turned_inside_out_is_seen_on_a_device(loops):
     assert block.evaluate(displacement) is None
 
 
+@pytest.fixture(scope="module")
+def alone():
+    """The press by the compiled loops."""
+    return small_press()
+
+
 def small_press(**changes):
     """A punch on 2 x 2 frusta to 0.5 N; settled to far less than the default, so that only rounding differs."""
     solver = NewtonSettings(relative_tolerance=1e-8, first_touch_tolerance_n=1e-6, kept_tangent_mm=0.0)
@@ -102,8 +108,7 @@ def small_press(**changes):
     return replace(sensor, **changes).press(punch, force_n=[0.2, 0.5], model="hyperelastic", threads=1, label="")
 
 
-def test_a_press_with_its_elements_on_a_device_gives_the_same_map(monkeypatch, loops):
-    alone = small_press()
+def test_a_press_with_its_elements_on_a_device_gives_the_same_map(monkeypatch, loops, alone):
     assert "elements on" not in alone.solver
     monkeypatch.setattr("softtact.press.sensor.find_device", lambda name: {"there": loops.device}[name])
     there = small_press(device="there")
