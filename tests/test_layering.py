@@ -12,9 +12,9 @@ MOST_LINES = 500
 # other.
 ORDER = (
     ("errors",),
-    ("unknown_names", "progress", "devices", "processes", "compiled"),
-    ("checksums", "inputs"),
-    ("outputs",),
+    ("unknown_names", "progress", "devices", "processes"),
+    ("checksums", "inputs", "kernel_files"),
+    ("outputs", "compiled"),
     ("files", "drawing", "exits"),
     ("tables",),
     ("linalg", "geometry", "materials"),

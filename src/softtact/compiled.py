@@ -6,9 +6,12 @@ each function, the sentence with which it would refuse another shape.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar, overload
 
 from numba import njit
+
+from softtact.kernel_files import KernelFiles
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -22,9 +25,14 @@ def compiled(**options: Any) -> Callable[[_Function], _Function]: ...
 
 
 def compiled(function: Any = None, **options: Any) -> Any:
-    """Decorate a function to be compiled: kept on disk, without Python's lock, and with numba's further options.
+    """Decorate a function to be compiled: kept on disk (`KernelFiles`), without Python's lock, and with numba's further options.
 
     It gets no entry for callers in C, which would take a tenth of the time to compile.
     """
+    if function is None:
+        return partial(compiled, **options)
     every: Any = {"cache": True, "nogil": True, "no_cfunc_wrapper": True} | options
-    return njit(function, **every)
+    kernel = njit(function, **every)
+    if (files := getattr(getattr(kernel, "_cache", None), "_cache_file", None)) is not None:     # not where numba is switched off
+        files.__class__ = KernelFiles
+    return kernel
