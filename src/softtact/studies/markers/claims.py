@@ -15,6 +15,7 @@ from softtact.evaluation.decisions import (
     COLUMNS,
     CONSISTENT,
     CONTRADICTION,
+    LEAST_OBJECTS,
     MEASUREMENTS,
     RULE,
     UNDECIDED,
@@ -212,8 +213,8 @@ def _larger_areas(rows: pd.DataFrame) -> dict[str, str]:
         "sec. V-A",
         "by eye",
         f"cylinder {one.cylinder:.3g}, pacman {one.pacman:.3g}, median {one.median():.3g} px",
-        verdict_of(bool(min(one.cylinder, one.pacman) > one.median())),
-        rule,
+        UNDECIDED,
+        f"{rule}; two objects are fewer than the {LEAST_OBJECTS} that a verdict needs",
         _SCORES,
         uncertainty="two objects that are named",
     )
