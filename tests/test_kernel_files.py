@@ -20,6 +20,7 @@ def double(x):
 @pytest.fixture
 def kernel(tmp_path, monkeypatch):
     """A function that imports the kernel as a new process would; it returns the kernel, which has not been called."""
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")     # beside the source, wherever the user keeps kernels
     (tmp_path / "kernel.py").write_text(KERNEL)
     kernel_files._warn.cache_clear()
 
