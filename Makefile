@@ -8,8 +8,7 @@
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
-CORES ?= all
-SNAKEMAKE = $(BIN)/snakemake --cores $(CORES)
+SNAKEMAKE = $(BIN)/snakemake --cores all
 
 DEFAULT_STUDIES = config skin probe grasps decide markers real
 TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps tiny-decide tiny-markers tiny-real

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy.special import ndtri, stdtrit
 
 REPRODUCED, NOT, CONTRADICTION, ARCHIVE = "reproduced", "not reproduced", "contradicts itself", "needs the archive"
 UNDECIDED, MEASUREMENTS = "undecided", "needs the paper's measurements"
@@ -81,7 +81,9 @@ def share_of_objects(hits: int, objects: int) -> Estimate:
     """Share of the objects of which something holds, with the exact interval of Clopper and Pearson."""
     if not objects:
         return Estimate(np.nan, np.nan, np.nan, 0)
-    interval = stats.binomtest(hits, objects).proportion_ci(LEVEL, method="exact")
+    from scipy.stats import binomtest  # half a second, for one kind of claim
+
+    interval = binomtest(hits, objects).proportion_ci(LEVEL, method="exact")
     return Estimate(hits / objects, float(interval.low), float(interval.high), objects)
 
 
@@ -96,13 +98,13 @@ def wider_spread(first: ArrayLike, second: ArrayLike) -> Estimate:
     if len(gap) < 4 or not (np.ptp(total) > 0 and np.ptp(gap) > 0):
         return Estimate(np.nan, np.nan, np.nan, len(gap))
     correlation = float(np.clip(np.corrcoef(total, gap)[0, 1], -1 + 1e-12, 1 - 1e-12))
-    ends = np.tanh(np.arctanh(correlation) + np.array([-1, 1]) * stats.norm.ppf(0.5 * (1 + LEVEL)) / np.sqrt(len(gap) - 3))
+    ends = np.tanh(np.arctanh(correlation) + np.array([-1, 1]) * ndtri(0.5 * (1 + LEVEL)) / np.sqrt(len(gap) - 3))
     return Estimate(correlation, float(ends[0]), float(ends[1]), len(gap))
 
 
 def known_within(value: float, standard_error: float) -> tuple[float, float]:
     """(low, high) of the 95 % interval of a number with a stated standard error."""
-    half = float(stats.norm.ppf(0.5 * (1 + LEVEL))) * standard_error
+    half = float(ndtri(0.5 * (1 + LEVEL))) * standard_error
     return value - half, value + half
 
 
@@ -162,4 +164,4 @@ def _finite(values):
 
 
 def _student(freedoms):
-    return float(stats.t.ppf(0.5 * (1 + LEVEL), freedoms))
+    return float(stdtrit(freedoms, 0.5 * (1 + LEVEL)))

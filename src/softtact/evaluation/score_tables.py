@@ -20,7 +20,6 @@ from scipy.spatial.distance import cdist
 
 from softtact.evaluation.scoring import score_predictions
 from softtact.learning.dataset import object_of
-from softtact.learning.network import taxel_weights
 from softtact.readout.capacitance import ideal_counts
 
 if TYPE_CHECKING:
@@ -130,6 +129,8 @@ def _quadratic(train):
 
 def taxel_depths(samples: "Samples") -> np.ndarray:
     """Mean deformation (n, row, column) in mm over each taxel."""
+    from softtact.learning.network import taxel_weights  # torch, which those who read tables alone do without
+
     rows, columns = (taxel_weights(points, parts)
                      for points, parts in zip(samples.maps_mm.shape[1:], samples.counts.shape[1:], strict=True))
     return rows @ samples.maps_mm.astype(float) @ columns.T

@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-import xarray
-from scipy import stats
+from scipy.special import ndtr, stdtrit
 
 from softtact.learning.dataset import Samples, object_of
-from softtact.learning.network import predict
-from softtact.press.result import wall_time_s
 from softtact.readout.ssim import map_ssim, mean_absolute_counts, others_mean, own_range_ssim
 
 if TYPE_CHECKING:
     import torch
+    import xarray
 
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
@@ -32,6 +30,8 @@ TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
 
 def score_samples(network: "torch.nn.Module", samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
     """`score_predictions` of a network's output for the samples' deformation maps."""
+    from softtact.learning.network import predict  # torch, which those who read tables alone do without
+
     return score_predictions(predict(network, samples.maps_mm), samples, ssim=ssim)
 
 
@@ -67,13 +67,17 @@ def score_sensor(samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=CEILING_COLUMNS)
 
 
-def predict_grasps(networks: "dict[str, torch.nn.Module]", grasps: dict[str, Samples]) -> xarray.Dataset:
+def predict_grasps(networks: "dict[str, torch.nn.Module]", grasps: dict[str, Samples]) -> "xarray.Dataset":
     """Predicted and measured maps of the grasped objects.
 
     networks, grasps: {model: network}, {model: samples}
     Returns a data set tactile_map (model, item, force, row, column) and sensor_map (item, force, row, column), the mean
     over the trials, in counts; nan for load steps outside a model's validity.
     """
+    import xarray
+
+    from softtact.learning.network import predict
+
     labels = next(iter(grasps.values())).labels
     items, forces = sorted(labels["item"].unique()), np.sort(labels.force_n.unique())
     tables = {model: load_step_means(samples, predict(networks[model], samples.maps_mm), items, forces)
@@ -147,7 +151,7 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
     taken = np.arange(sums.shape[1]) < n_trials[drawn, None]     # as many trials as the item has
     total, count = ((table[drawn[..., None], picks] * taken).sum(axis=(1, 2)) for table in (sums, counts))
     n = len(n_trials)
-    tail = stats.norm.cdf(-np.sqrt(n / (n - 1)) * stats.t.ppf(0.5 * (1 + level), n - 1))
+    tail = ndtr(-np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.5 * (1 + level)))
     low, high = np.quantile(total / count, [tail, 1 - tail])
     return float(low), float(high)
 
@@ -185,6 +189,8 @@ def time_presses(presses: "Iterable[xarray.Dataset]", networks: "dict[str, torch
     presses: data sets of `simulate_press`;  networks {model: network};  predict(network, maps (1, y, x))
     network_s: median over `repeats` of the time of one map, as for one press
     """
+    from softtact.press.result import wall_time_s
+
     rows = []
     for press in presses:
         names = [press.attrs[name] for name in ("model", "item", "set")]
