@@ -80,7 +80,9 @@ def test_processes_end_with_a_parent_that_is_killed(script, pipe):
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_to_the_parent_ends_its_processes_at_once_and_is_its_exit_status(number, status, pipe):
-    ended = PARENT.replace("list(", "from softtact.exits import run_to_status\nsys.exit(run_to_status('all', lambda: list(")
+    listening = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"     # in the background it is ignored
+    called = PARENT.replace("list(", "from softtact.exits import run_to_status\nsys.exit(run_to_status('all', lambda: list(")
+    ended = listening + called
     assert said_after(number, ended.rstrip() + "))", pipe) == (b"", status)
 
 
