@@ -5,17 +5,19 @@
 
 import argparse
 import shutil
+import subprocess
 import sys
 from datetime import date
 from pathlib import Path
 
 import pandas as pd
-from write_results import FOLDER, git, markdown, small
+from write_results import FOLDER, ROOT, git, markdown, small
 
 from softtact.errors import InputError
 from softtact.reporting.run_record import run_record, run_sentence
 
 CLAIMS, LARGEST = "tables/claims.csv", 20_000     # bytes of a table that is kept
+UP_TO_DATE = "Nothing to be done"     # what Snakemake says of a study whose results follow from its files, code and settings
 TITLES = {"real": "Gels with a camera on measured data", "markers": "Marker images of a gel",
           "decide": "Do the paper's claims hold?", "skin": "Robot skins", "probe": "A palpation sensor",
           "grasps": "Grasps by a robot"}
@@ -23,9 +25,7 @@ TITLES = {"real": "Gels with a camera on measured data", "markers": "Marker imag
 
 def keep(run: Path) -> dict[str, str]:
     """Copy what the page shows into docs/results/STUDY; what the run is. Raises InputError where it is not finished."""
-    for needed in (run / "report.html", run / CLAIMS):
-        if not needed.is_file():
-            raise InputError(f"{needed}: is missing, so this is no finished run of a study; run `make {run.name}` first.")
+    _refuse_outdated(run)
     kept = FOLDER / run.name
     shutil.rmtree(kept, ignore_errors=True)
     kept.mkdir(parents=True)
@@ -36,6 +36,14 @@ def keep(run: Path) -> dict[str, str]:
         small(picture, kept / picture.name)
     return {"date": date.today().isoformat(), "commit": git("rev-parse", "HEAD"),
             "run": run_sentence(run_record(run / "benchmarks"))}
+
+
+def _refuse_outdated(run: Path) -> None:
+    """Refuse what is no finished run of this checkout: then the page's commit is that of the run."""
+    said = subprocess.run([sys.executable, "-m", "snakemake", "--configfile", f"config/{run.name}.yaml", "--dry-run"], cwd=ROOT,
+                          capture_output=True, text=True)
+    if run.resolve() != ROOT / "results" / run.name or UP_TO_DATE not in said.stdout + said.stderr:
+        raise InputError(f"{run}: is not a finished run of this checkout and its sources; run `make {run.name}` first.")
 
 
 def page(name: str, made: dict[str, str]) -> str:

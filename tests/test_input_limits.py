@@ -155,3 +155,9 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "card.json")
     with pytest.raises(InputError, match="card.json: it is a device or a pipe; save what it gives to a file"):
         read_json(tmp_path / "card.json")
+
+
+def test_a_lack_of_memory_is_not_told_as_a_damaged_file(tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.zeros(3))
+    with pytest.raises(MemoryError), read_arrays(tmp_path / "a.npz"):
+        raise MemoryError

@@ -102,11 +102,12 @@ def unreadable(path: str | Path, error: OSError) -> UnreadableError:
 def in_one_sentence(path: str | Path, what: str, remedy: str) -> Iterator[None]:
     """A block that reads a file: whatever its reader raises becomes an `InputError` of one sentence with the file's name.
 
-    Readers of other packages raise errors of many kinds for a damaged file, some of which advise what is not meant for users.
+    Readers of other packages raise errors of many kinds for a damaged file, some of which advise what is not meant for users. A
+    lack of memory is none of the file's.
     """
     try:
         yield
-    except (SofttactError, ModuleNotFoundError):
+    except (SofttactError, ModuleNotFoundError, MemoryError):
         raise
     except Exception as error:
         if isinstance(error, OSError) and error.errno in (errno.EACCES, errno.EPERM, errno.EIO):

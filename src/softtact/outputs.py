@@ -5,7 +5,6 @@ A temporary file or folder has the process in its name. The next one in the same
 
 import contextlib
 import errno
-import fcntl
 import hashlib
 import os
 import platform
@@ -211,6 +210,8 @@ def held(folder: str | Path, *, busy: str = "another run of this study is in pro
     busy: what its message says of the other run
     The system releases this lock whenever its holder dies; Snakemake's lock would remain.
     """
+    import fcntl  # of POSIX alone, while the rest of this module serves every reader and writer
+
     file = Path(folder, ".running")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from simulated_recordings import HiddenConstants
 from support.calibration import Bench, small_sensor_file
 
 from softtact.calibration.fit import calibrate
-from softtact.calibration.ladder import FRICTIONS, Presses, friction_weights, with_friction
+from softtact.calibration.ladder import FRICTIONS, Presses, friction_weights
 from softtact.calibration.problem import Problem
 from softtact.models.hyperelastic.mesh_settings import PRESETS
 from softtact.press.sensor import load_sensor
@@ -31,7 +31,7 @@ def test_friction_of_an_object_comes_back_and_gains_are_nearer_with_it(tmp_path)
     """Recordings are of hyperelastic presses with a friction of 0.08 at other forces than the fit's. Measured: 0.087."""
     sensor = load_sensor(small_sensor_file(tmp_path))
     sensor.mesh, sensor.solver = (make() for make in PRESETS["draft"])
-    rubbed = with_friction(sensor.spec, 0.08)
+    rubbed = sensor.with_friction(0.08).spec
     drawn = HiddenConstants.drawn(sensor, seed=1)
     hidden = replace(drawn, modulus_scale=1.0, relaxation=(), relaxation_s=(), sheet_excess_mm=0 * drawn.sheet_excess_mm)
     real = Bench(Presses(replace(sensor, spec=rubbed, prepared_models={}), model="hyperelastic"), hidden)

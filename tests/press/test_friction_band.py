@@ -3,33 +3,17 @@
 import numpy as np
 import pytest
 import trimesh
+from support.gels import SMALL_GEL
 
 from softtact.errors import InputError
 from softtact.press.friction_band import press_over_friction
 from softtact.press.sensor import load_sensor
 
-GEL = """
-kind: layers
-name: small_gel
-footprint_mm: [16, 20]
-map_shape: [41, 33]
-force_range_n: [0, 50]
-support: base
-layers: [{material: gel_silicone, thickness_mm: 3.0}]
-elastic_layer: {young_mpa: 0.4, poisson: 0.48}
-edge: far
-friction: {object: 0.5}
-readouts:
-  camera: {kind: camera, pixels: [64, 48], mm_per_px: 0.3, distance_mm: 30, shading: gelsight_mini,
-           markers: {rows: 3, columns: 5, pitch_mm: 2.5, radius_mm: 0.5}}
-  markers: {kind: markers}
-"""
-
 
 @pytest.fixture(scope="module")
 def band(tmp_path_factory):
     path = tmp_path_factory.mktemp("gel") / "gel.yaml"
-    path.write_text(GEL)
+    path.write_text(SMALL_GEL)
     ball = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
     return press_over_friction(load_sensor(path), ball, [0.8, 0.1], motion="z -0.5; x 1.0 in 5")
 

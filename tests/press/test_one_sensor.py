@@ -132,6 +132,13 @@ def test_a_twist_by_its_text_turns_a_rigid_object_on_each_kind(sensors, kind):
         assert np.linalg.norm(turned, axis=1) == pytest.approx(2 * np.sin(np.radians(1)) * np.linalg.norm(arm, axis=1), rel=1e-6)
 
 
+@pytest.mark.parametrize(("kind", "place"), [("frusta", ("friction", "object")), ("solid", ("contact", "friction"))])
+def test_a_coefficient_of_friction_is_changed_on_each_kind(sensors, kind, place):
+    block, key = place
+    assert getattr(getattr(sensors[kind].with_friction(0.7).spec, block), key) == 0.7
+    assert getattr(getattr(sensors[kind].spec, block), key) != 0.7
+
+
 def test_a_model_refuses_what_it_cannot_bear_and_names_one_that_can(sensors):
     for model, motion, remedy in [("foundation", "z -0.1", "use elastic, hyperelastic or solid for this motion"),
                                   ("elastic", "z -0.1; rz 3", "use model='solid' for this motion"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.gels import SMALL_GEL
 
 from softtact.errors import InputError
 
@@ -10,28 +11,11 @@ pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
 
 ID = "softtact.robot.environment:softtact/Grasp-v0"
 STILL = {"x_mm": 0.0, "y_mm": 0.0, "angle_deg": 0.0}
-COARSE = """
-kind: layers
-name: small_gel
-footprint_mm: [16, 20]
-map_shape: [41, 33]
-force_range_n: [0, 50]
-support: base
-layers: [{material: gel_silicone, thickness_mm: 3.0}]
-elastic_layer: {young_mpa: 0.4, poisson: 0.48}
-edge: far
-friction: {object: 0.5}
-readouts:
-  camera: {kind: camera, pixels: [64, 48], mm_per_px: 0.3, distance_mm: 30, shading: gelsight_mini,
-           markers: {rows: 3, columns: 5, pitch_mm: 2.5, radius_mm: 0.5}}
-  markers: {kind: markers}
-"""
-
 
 @pytest.fixture(scope="module")
 def gel(tmp_path_factory):
     path = tmp_path_factory.mktemp("gel") / "small_gel.yaml"
-    path.write_text(COARSE)
+    path.write_text(SMALL_GEL)
     return str(path)
 
 

@@ -11,6 +11,23 @@ from softtact.readout.registry import PlaneMotion, make_readout
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import any_spec
 
+SMALL_GEL = """
+kind: layers
+name: small_gel
+footprint_mm: [16, 20]
+map_shape: [41, 33]
+force_range_n: [0, 50]
+support: base
+layers: [{material: gel_silicone, thickness_mm: 3.0}]
+elastic_layer: {young_mpa: 0.4, poisson: 0.48}
+edge: far
+friction: {object: 0.5}
+readouts:
+  camera: {kind: camera, pixels: [64, 48], mm_per_px: 0.3, distance_mm: 30, shading: gelsight_mini,
+           markers: {rows: 3, columns: 5, pitch_mm: 2.5, radius_mm: 0.5}}
+  markers: {kind: markers}
+"""
+
 
 def gel_values(name="gelsight_wonkdim", **changes):
     """Keys and values of a shipped gel's file, those of its camera changed."""

@@ -14,7 +14,7 @@ import yaml
 from scipy.optimize import least_squares
 
 from softtact.calibration.discrepancy import discrepancy
-from softtact.calibration.ladder import COVERS, Presses, parabola, with_cover, with_friction
+from softtact.calibration.ladder import COVERS, Presses, parabola, with_cover
 from softtact.calibration.problem import Linear, Problem
 from softtact.errors import ConvergenceError
 from softtact.files import atomic_path
@@ -264,10 +264,10 @@ def _difference(result, k):
     if force == 0:
         return None
     announce(f"{one.name}: pressing with the hyperelastic model at {force:.3g} N")
-    friction, spec = problem.value(result.vector, "friction", 0.0), with_cover(sensor.spec, cover)
+    friction = problem.value(result.vector, "friction", 0.0)
+    calibrated = replace(sensor, spec=with_cover(sensor.spec, cover), prepared_models={})
     if "friction" in problem.names:
-        spec = with_friction(spec, friction)
-    calibrated = replace(sensor, spec=spec, prepared_models={})
+        calibrated = calibrated.with_friction(friction)
     try:
         other = Presses(calibrated, model="hyperelastic", levels=1).ladder(one.mesh, place, largest_n=force).maps_mm[-1]
     except ConvergenceError:

@@ -155,13 +155,8 @@ def friction_ladders(sensor: Sensor, mesh: trimesh.Trimesh, place: Sequence[floa
             for friction, ladder in zip(FRICTIONS[1:], ladders[1:], strict=True)}
 
 
-def with_friction(spec: SensorSpec, friction: float) -> SensorSpec:
-    """A sensor with this coefficient of friction between the object and its cover."""
-    return spec.model_copy(update={"friction": spec.friction.model_copy(update={"object": friction})})
-
-
 def _ladder(sensor, friction, mesh, place, largest_n):
-    rough = replace(sensor, spec=with_friction(sensor.spec, friction), prepared_models={})
+    rough = replace(sensor.with_friction(friction), prepared_models={})
     return Presses(rough, model="hyperelastic", levels=LEVELS).ladder(mesh, np.asarray(place, dtype=float), largest_n=largest_n)
 
 

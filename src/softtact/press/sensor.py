@@ -139,8 +139,9 @@ class Sensor:
         """The sensor with Coulomb's coefficient of an object on its surface, from 0 on. Raises InputError for another number."""
         if not 0 <= coefficient < float("inf"):
             raise InputError(f"friction {coefficient:g}: give a number from 0 on.")
-        friction = self.spec.friction.model_copy(update={"object": float(coefficient)})
-        return replace(self, spec=self.spec.model_copy(update={"friction": friction}))
+        block, key = ("friction", "object") if self.spec.has_layers else ("contact", "friction")
+        changed = getattr(self.spec, block).model_copy(update={key: float(coefficient)})
+        return replace(self, spec=self.spec.model_copy(update={block: changed}))
 
     def prepared(self, model: str, threads: int = 1) -> Any:
         """Prepared data of a fast model: `Compliance`, `WideLayer` of a gel, or `FoundationCompliance`, computed on first use."""

@@ -1,7 +1,7 @@
 """Objects, their presses, and the data set."""
 
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,10 +96,7 @@ def sensor_with(file: str | Path, friction: float | None) -> "Sensor":
     from softtact.press.sensor import load_sensor
 
     sensor = load_sensor(file)
-    if friction is None:
-        return sensor
-    block = sensor.spec.friction.model_copy(update={"object": friction})
-    return replace(sensor, spec=sensor.spec.model_copy(update={"friction": block}))
+    return sensor if friction is None else sensor.with_friction(friction)
 
 
 def list_data(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
