@@ -2,8 +2,10 @@
 
 MuJoCo's pads are rigid. Its scene gives the normal force, the shear force, and how far the object has slid and turned on the pad
 since it touched. A gel gives way under the shear besides: the object is moved aside until the gel carries the scene's shear force
-within `_TOLERANCE`. One call corrects at most `_CORRECTIONS` times; what is missing then follows in the next call. A gel that loses
-contact begins at rest again. Tilt after the first touch is left out, as in `taxels`.
+within `_TOLERANCE`, up to `_SLIDES` of what friction carries. Near that bound the force says little of the way, and a load that
+varies would drive the object on and on: there the scene's slide alone moves it. One call corrects at most `_CORRECTIONS` times;
+what is missing then follows in the next call. A gel that loses contact begins at rest again. Tilt after the first touch is left
+out, as in `taxels`.
 """
 
 from collections.abc import Mapping
@@ -29,7 +31,7 @@ from softtact.robot.events import FINGERS, pose_of, set_down
 _TOUCH_N = 0.02           # normal force below which a gel is free
 _CORRECTIONS = 3          # of the displacement aside in one call, and
 _TOLERANCE = 0.02         # of the shear, as a share of what friction carries, at which none follows
-_SLIDES = 0.98            # share of what friction carries, beyond which a gel slides whatever the force is
+_SLIDES = 0.85            # share of what friction carries, up to which the force moves the object; beyond, its slide alone
 _SOFTEST = 0.2            # of a contact's first stiffness aside: what slips in part is softer, and a step shall not go too far
 # Change of slide (mm, twice) and turn (degrees), and of forces as a share of them, below which the last reading stands.
 _STILL, _STILL_N = np.array([1e-3, 1e-3, 0.01]), 1e-3
