@@ -8,11 +8,13 @@ import pytest
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import read_json, write_json
 from softtact.materials.card_making import difference, make_card, partings, paths_inside, paths_outside
-from softtact.materials.cards import law_from_card, linear_from_card, load_card, write_card
+from softtact.materials.cards import law_from_card, linear_from_card, load_card, mullins_from_card, prony_from_card, write_card
 from softtact.materials.consistency import disagreements
 from softtact.materials.curves import Curve, VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, bulk_modulus, young_modulus
+from softtact.materials.mullins import Mullins
+from softtact.materials.prony import PronySeries
 from softtact.materials.readers import read_curve, read_curves
 from softtact.press.hyperelastic import _warn_extrapolation
 
@@ -31,6 +33,26 @@ def test_a_card_survives_its_file(card, tmp_path):
     again = load_card(tmp_path / "foam.json")
     assert again == json.loads(json.dumps(card))
     assert law_from_card(again).parameters == pytest.approx(TRUTH, rel=1e-6)
+
+
+def test_a_card_gives_back_its_mullins_effect_and_its_prony_series(card, tmp_path):
+    assert mullins_from_card(card) is None and prony_from_card(card) is None
+    blocks = {"mullins": {"r": 2, "m_mpa": 0.05, "beta": 0.1}, "prony": {"g": [0.2], "tau_s": [3], "moduli": "relaxed"}}
+    write_card(tmp_path / "foam.json", card | blocks)
+    again = load_card(tmp_path / "foam.json")
+    assert mullins_from_card(again) == Mullins(2.0, 0.05, 0.1)
+    assert prony_from_card(again) == PronySeries((0.2,), (3.0,), "relaxed")
+
+
+@pytest.mark.parametrize(("block", "sentence"), [
+    ({"mullins": {"r": 0.5, "m_mpa": 0.05, "beta": 0.1}}, "foam.json: mullins: r is 0.5; give a finite number above 1"),
+    ({"mullins": {"r": 2, "m_mpa": "0.05", "beta": 0.1}}, "foam.json: mullins.m_mpa is '0.05'"),
+    ({"prony": {"g": [0.7, 0.6], "tau_s": [1, 2], "moduli": "relaxed"}}, "foam.json: prony: the sum of g is 1.3"),
+    ({"prony": {"g": [0.7], "tau_s": [1]}}, "foam.json: the key prony.moduli is missing")])
+def test_a_card_with_impossible_blocks_is_refused(card, tmp_path, block, sentence):
+    write_card(tmp_path / "foam.json", card | block)
+    with pytest.raises(InputError, match=sentence):
+        load_card(tmp_path / "foam.json")
 
 
 def test_a_card_of_which_a_digit_changed_is_refused_unless_it_is_meant(card, tmp_path):

@@ -12,6 +12,8 @@ from softtact.materials.curves import principal_window
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import FOAM_LAWS, make_law
 from softtact.materials.linear import LinearConstants
+from softtact.materials.mullins import Mullins
+from softtact.materials.prony import PronySeries
 
 
 class _CardLaw(pydantic.BaseModel):
@@ -20,6 +22,24 @@ class _CardLaw(pydantic.BaseModel):
     model_config = pydantic.ConfigDict(strict=True)
     parameters: dict[str, pydantic.FiniteFloat]
     bulk_modulus_mpa: pydantic.FiniteFloat | None = None
+
+
+class _CardMullins(pydantic.BaseModel):
+    """The constants of the Mullins effect."""
+
+    model_config = pydantic.ConfigDict(strict=True)
+    r: pydantic.FiniteFloat
+    m_mpa: pydantic.FiniteFloat
+    beta: pydantic.FiniteFloat
+
+
+class _CardProny(pydantic.BaseModel):
+    """The Prony series of the shear modulus."""
+
+    model_config = pydantic.ConfigDict(strict=True)
+    g: list[pydantic.FiniteFloat]
+    tau_s: list[pydantic.FiniteFloat]
+    moduli: str
 
 
 class _Card(pydantic.BaseModel):
@@ -31,6 +51,8 @@ class _Card(pydantic.BaseModel):
     chosen: str
     laws: dict[str, _CardLaw]
     strain_window: dict[str, Annotated[list[pydantic.PositiveFloat], pydantic.Field(min_length=2, max_length=2)]] = {}
+    mullins: _CardMullins | None = None
+    prony: _CardProny | None = None
 
 
 def write_card(path: str | Path, card: dict[str, Any]) -> None:
@@ -49,7 +71,23 @@ def load_card(path: str | Path) -> dict[str, Any]:
     if missing:
         raise InputError(f"{path}: not a material card, it lacks {', '.join(missing)}; write it with `softtact fit`.")
     validated(_Card, card, where=str(path))
+    try:
+        mullins_from_card(card), prony_from_card(card)
+    except InputError as error:     # of constants: the message does not name the file
+        raise InputError(f"{path}: {error}") from None
     return card
+
+
+def mullins_from_card(card: dict[str, Any]) -> Mullins | None:
+    """The `Mullins` softening of a card, which acts on its chosen law; None for a card without."""
+    block = card.get("mullins")
+    return None if block is None else Mullins(**_CardMullins(**block).model_dump())
+
+
+def prony_from_card(card: dict[str, Any]) -> PronySeries | None:
+    """The `PronySeries` of a card; None for a card without."""
+    block = card.get("prony")
+    return None if block is None else PronySeries(**_CardProny(**block).model_dump())
 
 
 def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
