@@ -14,6 +14,14 @@ def test_a_line_says_what_the_calls_do():
     assert Motion.parse("z -0.5 x 0.2; rz 5") == Motion().step(ways={"z": -0.5, "x": 0.2}).step(ways={"rz": 5.0})
 
 
+def test_a_line_says_how_long_steps_take_and_what_is_held():
+    assert Motion.parse("fz -20 over 0.5; hold 60 in 3") == Motion().press(force_n=20, over_s=0.5).hold(60, steps=3)
+    assert Motion.parse("z -1 over 2 s in 4") == Motion.parse("z -1 in 4 over 2s")
+    timed = Motion.parse("z -1.0 in 4 over 2s; hold 1e1 s")
+    np.testing.assert_allclose(timed.times_s, [0.5, 1.0, 1.5, 2.0, 12.0])
+    assert Motion.parse("z -1").times_s is None
+
+
 def test_depths_count_from_first_touch_and_ways_from_where_a_step_begins():
     motion = Motion().press(depth_mm=[0.2, 0.5]).press(depth_mm=0.3)
     assert [step.ways["z"] for step in motion.steps] == pytest.approx([-0.2, -0.3, 0.2]) and motion.depth_mm == pytest.approx(0.3)
@@ -48,7 +56,11 @@ def test_steps_that_are_no_motion_are_refused_in_one_sentence():
         (lambda: Motion().press(force_n=5).press(depth_mm=1.0), "a depth after a press by force is not known"),
         (lambda: Motion.parse("z -1; aside 2"), "the step 'aside 2' is not understood"),
         (lambda: Motion.parse("q 1"), "'q' in the step 'q 1' is no freedom"),
-        (lambda: Motion.parse(" ; "), "there is no step in")]:
+        (lambda: Motion.parse(" ; "), "there is no step in"),
+        (lambda: Motion.parse("z -1 over 0"), "a duration of 0 s is not possible"),
+        (lambda: Motion.parse("hold -2"), "a duration of -2 s is not possible"),
+        (lambda: Motion.parse("hold"), "the step 'hold' is not understood"),
+        (lambda: Motion.parse("z -1 over 1; x 1").times_s, "step 2 of 2 has no duration and others have")]:
         with pytest.raises(InputError, match=sentence) as caught:
             make()
         assert "\n" not in str(caught.value), make

@@ -36,3 +36,11 @@ def test_the_derivative_of_the_softening_is_that_of_finite_differences():
 def test_constants_without_a_meaning_are_refused(constants):
     with pytest.raises(InputError, match="mullins: .*(give a finite number|make one of them positive)"):
         Mullins(*constants)
+
+
+def test_the_energy_is_the_integral_of_the_softening_and_continues_first_loading():
+    from scipy.integrate import quad
+
+    lost, _ = quad(lambda energy: float(SOFT.softening(energy, 0.4)), 0.1, 0.4, epsabs=1e-13)
+    assert SOFT.energy(0.4, 0.4) - SOFT.energy(0.1, 0.4) == pytest.approx(lost, rel=1e-10)
+    assert SOFT.energy(0.4, 0.4) == pytest.approx(0.4, rel=1e-14)

@@ -32,6 +32,18 @@ def test_the_moduli_in_frequency_are_the_transform_of_the_relaxation():
     assert SERIES.storage_loss(omega) == (pytest.approx(modulus.real, rel=1e-8), pytest.approx(modulus.imag, rel=1e-8))
 
 
+def test_creep_is_the_inverse_of_relaxation():
+    """int G(t - s) dc(s) = g_inf for all t, by parts and Simpson's rule; one term: g late by tau / g_inf (Zener's solid)."""
+    from scipy.integrate import simpson
+
+    for end in (0.05, 1.0, 30.0):
+        time = np.linspace(0, end, 20_001)
+        fading = sum(g / tau * np.exp(-(end - time) / tau) for g, tau in zip(SERIES.g, SERIES.tau_s, strict=True))
+        assert SERIES.creep(end) - simpson(fading * SERIES.creep(time), x=time) == pytest.approx(0.5, rel=1e-7)
+    shares, times = PronySeries((0.2,), (3.0,)).retardation()
+    assert shares == pytest.approx([0.2], rel=1e-12) and times == pytest.approx([3.0 / 0.8], rel=1e-12)
+
+
 def test_relaxed_moduli_are_scaled_to_the_instantaneous_ones():
     assert SERIES.instantaneous_factor == 1
     assert PronySeries(SERIES.g, SERIES.tau_s, "relaxed").instantaneous_factor == pytest.approx(2)

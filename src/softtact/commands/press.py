@@ -41,6 +41,7 @@ EXAMPLES = """
   softtact press tomato.stl --unit mm --force 10 --object-law card.json --object-size 2.5
   softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
   softtact press ball.stl --unit mm --force 5 --sensor dome.yaml --out press.nc     # a sensor of kind solid
+  softtact press part.stl --unit mm --motion "fz -10 over 0.2; hold 60 in 6" --sensor mine.yaml    # of a sensor that relaxes
   softtact press part.stl --unit mm --sensor gelsight_mini --motion "z -1.0 in 5; x 1.0 in 5" --image out.png --movie out.mp4
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic", "solid")
@@ -56,7 +57,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     how.add_argument("--force", type=float, action="append", metavar="N", help="force in N; repeat it for several load steps")
     how.add_argument("--motion", metavar="STEPS",
                      help='steps between semicolons: x, y, z in mm ("z -1.0" is down), rx, ry, rz in degrees, "fz -20" a force in '
-                          'N, "x 1.0 in 10" ten steps')
+                          'N, "x 1.0 in 10" ten steps; of what relaxes "fz -20 over 0.5; hold 60 in 6" in s')
     command.add_argument("--model", choices=MODELS, default="auto",
                          help="a model by its name; auto (default) lets the policy choose")
     command.add_argument("--policy", choices=("error", "paper"), default="error",
@@ -284,7 +285,18 @@ def _summary_on_layers(result):
                                         if "expected_error_times_low" in result.attributes else None)
     facts["expected_error_calibrated_on"] = result.attributes.get("expected_error_calibrated_on")
     facts |= {"sensor": result.sensor, "largest_counts": result.largest_counts}
-    return facts | {name: _or_none(values) for name, values in load_steps.items()}
+    return facts | _times(result) | {name: _or_none(values) for name, values in load_steps.items()}
+
+
+def _times(result):
+    """The steps' times, where they have durations."""
+    return {} if result.time_s is None else {"time_s": _or_none(result.time_s)}
+
+
+def _time_column(summary):
+    """Head and cells of a column of the steps' times; without durations empty."""
+    times = summary.get("time_s")
+    return (f"{'time, s':>10}", [f"{time:10.4g}" for time in times]) if times else ("", [""] * len(summary["iterations"]))
 
 
 def _summary_on_solids(result):
@@ -296,7 +308,7 @@ def _summary_on_solids(result):
               "largest_pressure_mpa": np.nanmax(result.contact_pressure_mpa, axis=(1, 2))}
     names = ("volume_ratio_range", "stretch_range", "extrapolated_volume_fraction", "penetration_mm", "residual_n", "iterations",
              "increments", "reading_points_mm", "reading_displacement_mm", "reading_pressure_mpa", "wall_time_s")
-    return {"model": result.model} | {name: _or_none(value) for name, value in
+    return {"model": result.model} | _times(result) | {name: _or_none(value) for name, value in
                                       (values | {name: getattr(result, name) for name in names}).items()}
 
 
@@ -315,11 +327,12 @@ def _lines_on_layers(summary):
         yield from gel_lines(summary)
         yield from _quality_lines(summary)
         return
-    yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
+    head, times = _time_column(summary)
+    yield f"{head}{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
     names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm")
     counts = (sum(map(sum, one)) for one in summary["tactile_map"])
-    for force, depth, area, deepest, total in zip(*(summary[name] for name in names), counts, strict=True):
-        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{total:14.0f}"
+    for time, force, depth, area, deepest, total in zip(times, *(summary[name] for name in names), counts, strict=True):
+        yield f"{time}{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{total:14.0f}"
     yield from _quality_lines(summary)
 
 
@@ -380,10 +393,11 @@ def _quality_lines(summary):
 
 
 def _lines_on_solids(summary):
-    yield f"{'force x, y, z, N':>33}{'displacement x, y, z, mm':>33}{'most moved, mm':>16}{'pressure, MPa':>15}"
+    head, times = _time_column(summary)
+    yield f"{head}{'force x, y, z, N':>33}{'displacement x, y, z, mm':>33}{'most moved, mm':>16}{'pressure, MPa':>15}"
     names = ("load", "way_mm", "largest_displacement_mm", "largest_pressure_mpa")
-    for load, displacement, moved, pressure in zip(*(summary[name] for name in names), strict=True):
-        yield "".join(f"{value:11.3g}" for value in (*load[:3], *displacement)) + f"{moved:16.4f}{pressure:15.4g}"
+    for time, load, displacement, moved, pressure in zip(times, *(summary[name] for name in names), strict=True):
+        yield time + "".join(f"{value:11.3g}" for value in (*load[:3], *displacement)) + f"{moved:16.4f}{pressure:15.4g}"
     if summary["reading_points_mm"]:
         yield "readings at the last step:"
         yield f"{'point x, y, z, mm':>33}{'displacement x, y, z, mm':>33}{'pressure, MPa':>15}"

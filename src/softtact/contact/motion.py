@@ -4,11 +4,14 @@
     Motion().press(depth_mm=1.0).slide(x_mm=1.0, steps=10) # down by depth, then aside, ten steps
     Motion().press(force_n=10).turn(z_deg=15, steps=3)     # down by force, which stays, then about the vertical axis
     Motion.parse("z -1.0; x 1.0 in 10")                    # the same in one line
+    Motion().press(force_n=10, over_s=0.5).hold(60)        # in half a second, then held, for a material that relaxes
+    Motion.parse("fz -10 over 0.5; hold 60")               # the same
 
 Freedoms: x, y, z in mm and rx, ry, rz in degrees of the object in the sensor's frame (z out of the surface, so down is negative).
 A motion starts where the object just touches the surface at rest. A prescribed freedom moves by the given increment from the step's
 start; a loaded one takes the position at which the sensor's surface carries the step's force (N) or torque (N mm). A freedom that a
 step does not name keeps its state: a prescribed freedom its position, a loaded one its load.
+Steps without durations are slow: a material that relaxes has relaxed at the end of each.
 """
 
 import math
@@ -22,8 +25,12 @@ from softtact.errors import InputError
 
 FREEDOMS = ("x", "y", "z", "rx", "ry", "rz")
 LOADS = ("fx", "fy", "fz", "mx", "my", "mz")     # the loads of the same freedoms, on the sensor's surface
-_TERM = re.compile(r"([a-z]{1,2})\s*=?\s*([-+]?[0-9.]+(?:e[-+]?[0-9]+)?)", re.IGNORECASE)
-_HINT = 'write steps like "z -1.0; x 1.0 in 10" (mm, degrees) or "fz -20" (N), with semicolons between steps'
+_NUMBER = r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?"
+_TERM = re.compile(rf"([a-z]{{1,2}})\s*=?\s*({_NUMBER})", re.IGNORECASE)
+_OVER, _IN = rf"\s+over\s+({_NUMBER})\s*s?", r"\s+in\s+([0-9]+)"
+_HOLD = re.compile(rf"hold\s+({_NUMBER})\s*s?", re.IGNORECASE)
+_HINT = ('write steps like "z -1.0; x 1.0 in 10" (mm, degrees), "fz -20" (N) or "fz -20 over 0.5; hold 10" (s), with semicolons '
+         "between steps")
 
 
 @dataclass(frozen=True)
@@ -34,6 +41,8 @@ class MotionStep:
     """Freedom to displacement or rotation: mm or degrees, from where the step begins."""
     loads: dict[str, float] = field(default_factory=dict)
     """Freedom to load at the step's end: N or N mm on the sensor's surface; pressing down is a negative z."""
+    seconds: float | None = None
+    """How long it takes; None: so long that a material that relaxes has relaxed at its end."""
 
 
 @dataclass(frozen=True)
@@ -43,39 +52,49 @@ class Motion:
     steps: tuple[MotionStep, ...] = ()
     """The steps in their order; a result holds the state at the end of each."""
 
-    def press(self, *, force_n: float | Sequence[float] | None = None, depth_mm: float | Sequence[float] | None = None) -> "Motion":
+    def press(self, *, force_n: float | Sequence[float] | None = None, depth_mm: float | Sequence[float] | None = None,
+              over_s: float | None = None) -> "Motion":
         """Press straight down, by force (N, positive) or to a depth (mm, from first touch), one step for each value.
 
+        over_s: seconds for all of them together
         Raises InputError where both or none are given, or a value is not finite and positive.
         """
         if (force_n is None) == (depth_mm is None):
             raise InputError("Motion.press takes either force_n or depth_mm; give one of them.")
         name, given = ("force_n", force_n) if depth_mm is None else ("depth_mm", depth_mm)
         values = [_positive(name, value) for value in np.atleast_1d(np.asarray(given, dtype=float))]
+        each = _share("press", over_s, len(values))
         if depth_mm is None:
-            return Motion(self.steps + tuple(MotionStep(loads={"z": -force}) for force in values))
+            return Motion(self.steps + tuple(MotionStep(loads={"z": -force}, seconds=each) for force in values))
         reached = [self.depth_mm, *values]
-        return Motion(self.steps + tuple(MotionStep(ways={"z": before - after})
+        return Motion(self.steps + tuple(MotionStep(ways={"z": before - after}, seconds=each)
                                          for before, after in zip(reached, reached[1:], strict=False)))
 
-    def slide(self, *, x_mm: float = 0.0, y_mm: float = 0.0, steps: int = 1) -> "Motion":
-        """Move the object along x and y (mm) in equal steps at constant depth, or constant force."""
-        return self._in_steps("slide", {"x": _finite("x_mm", x_mm), "y": _finite("y_mm", y_mm)}, steps)
+    def slide(self, *, x_mm: float = 0.0, y_mm: float = 0.0, steps: int = 1, over_s: float | None = None) -> "Motion":
+        """Move the object along x and y (mm) in equal steps at constant depth, or constant force; `over_s` seconds for all."""
+        return self._in_steps("slide", {"x": _finite("x_mm", x_mm), "y": _finite("y_mm", y_mm)}, steps, over_s)
 
-    def turn(self, *, x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0, steps: int = 1) -> "Motion":
-        """Turn the object about the axes through its reference point by angles (degrees) in equal steps; other freedoms keep
-        their state."""
+    def turn(self, *, x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0, steps: int = 1,
+             over_s: float | None = None) -> "Motion":
+        """Turn the object about the axes through its reference point by angles (degrees) in equal steps, `over_s` seconds for all;
+        other freedoms keep their state."""
         return self._in_steps("turn", {"rx": _finite("x_deg", x_deg), "ry": _finite("y_deg", y_deg),
-                                       "rz": _finite("z_deg", z_deg)}, steps)
+                                       "rz": _finite("z_deg", z_deg)}, steps, over_s)
 
-    def _in_steps(self, name: str, ways: dict[str, float], steps: int) -> "Motion":
+    def hold(self, seconds: float, *, steps: int = 1) -> "Motion":
+        """Keep all freedoms as they are, positions and loads, for so many seconds in equal steps."""
+        return self._in_steps("hold", {}, steps, seconds)
+
+    def _in_steps(self, name: str, ways: dict[str, float], steps: int, over_s: float | None) -> "Motion":
         if steps < 1:
             raise InputError(f"Motion.{name}: steps={steps} is not possible; give 1 or more.")
-        return Motion(self.steps + steps * (MotionStep({freedom: way / steps for freedom, way in ways.items() if way}),))
+        one = MotionStep({freedom: way / steps for freedom, way in ways.items() if way}, seconds=_share(name, over_s, steps))
+        return Motion(self.steps + steps * (one,))
 
-    def step(self, *, ways: dict[str, float] | None = None, loads: dict[str, float] | None = None) -> "Motion":
+    def step(self, *, ways: dict[str, float] | None = None, loads: dict[str, float] | None = None,
+             over_s: float | None = None) -> "Motion":
         """One step of any freedoms: displacements (`ways`; mm, degrees) from the step's start, loads (N, N mm) at its end."""
-        return self._with(MotionStep(dict(ways or {}), dict(loads or {})))
+        return self._with(MotionStep(dict(ways or {}), dict(loads or {}), _share("step", over_s, 1)))
 
     def _with(self, step: MotionStep) -> "Motion":
         for name in (*step.ways, *step.loads):
@@ -100,6 +119,31 @@ class Motion:
         """The normal forces (N, positive) of a motion that only presses straight down by force; None for other motions."""
         straight = all(set(step.loads) == {"z"} and not step.ways for step in self.steps)
         return [-step.loads["z"] for step in self.steps] if self.steps and straight else None
+
+    @property
+    def held_forces_n(self) -> np.ndarray | None:
+        """The normal forces (k,) in N, positive, of a motion that presses straight down by force and holds; None for others."""
+        straight = bool(self.steps) and set(self.steps[0].loads) == {"z"} and all(
+            not step.ways and not step.loads.keys() - {"z"} for step in self.steps)
+        if not straight:
+            return None
+        forces = [-step.loads.get("z", np.nan) for step in self.steps]
+        last = np.maximum.accumulate(np.where(np.isnan(forces), 0, np.arange(len(forces))))
+        return np.array(forces)[last]
+
+    @property
+    def times_s(self) -> np.ndarray | None:
+        """(steps,) in s from the start to each step's end; None where no step has a duration.
+
+        Raises InputError where some steps have one and others have none.
+        """
+        seconds = [step.seconds for step in self.steps]
+        if all(one is None for one in seconds):
+            return None
+        if None in seconds:
+            raise InputError(f"motion: step {seconds.index(None) + 1} of {len(seconds)} has no duration and others have; give one "
+                             'to each, such as "z -1.0 over 0.5", or to none.')
+        return np.cumsum(np.array(seconds, dtype=float))
 
     @property
     def straight(self) -> bool:
@@ -137,23 +181,31 @@ class Motion:
         """
         motion = cls()
         for part in filter(None, (part.strip() for part in text.split(";"))):
-            terms, _, count = part.partition(" in ")
-            found = _TERM.findall(terms)
-            if not found or _TERM.sub("", terms).strip(" ,") or (count and not count.strip().isdigit()) or count.strip() == "0":
+            terms, over = _cut(part, _OVER)
+            terms, count = _cut(terms, _IN)
+            if over is None:
+                terms, over = _cut(terms, _OVER)
+            held, found = _HOLD.fullmatch(terms), _TERM.findall(terms)
+            if count == "0" or (over is not None if held else not found or _TERM.sub("", terms).strip(" ,")):
                 raise InputError(f"motion: the step {part!r} is not understood; {_HINT}.")
-            motion = motion._terms(part, [(name.lower(), float(value)) for name, value in found], int(count or 1))
+            if held:
+                motion = motion.hold(_read(part, held[1]), steps=int(count or 1))
+                continue
+            motion = motion._terms(part, [(name.lower(), _read(part, value)) for name, value in found], int(count or 1),
+                                   None if over is None else _read(part, over))
         if not motion.steps:
             raise InputError(f"motion: there is no step in {text!r}; {_HINT}.")
         return motion
 
-    def _terms(self, part: str, terms: list[tuple[str, float]], count: int) -> "Motion":
+    def _terms(self, part: str, terms: list[tuple[str, float]], count: int, over_s: float | None) -> "Motion":
         if unknown := [name for name, _ in terms if name not in FREEDOMS + LOADS]:
             raise InputError(f"motion: {unknown[0]!r} in the step {part!r} is no freedom; use one of "
                              f"{', '.join(FREEDOMS)} for a displacement, {', '.join(LOADS)} for a load.")
         loads = {FREEDOMS[LOADS.index(name)]: value for name, value in terms if name in LOADS}
         ways, motion = {name: value / count for name, value in terms if name in FREEDOMS}, self
+        each = _share("step", over_s, count)
         for _ in range(count):
-            motion = motion.step(ways=ways, loads=loads)
+            motion = motion.step(ways=ways, loads=loads, over_s=each)
         return motion
 
 
@@ -167,3 +219,25 @@ def _positive(name: str, value: float) -> float:
     if not _finite(name, value) > 0:
         raise InputError(f"Motion.press: {name}={value:g} does not press; give a value above 0.")
     return float(value)
+
+
+def _share(name: str, over_s: float | None, steps: int) -> float | None:
+    """The duration in s of each of some steps of a method's name that take `over_s` together."""
+    if over_s is None:
+        return None
+    if not _finite("over_s", over_s) > 0:
+        raise InputError(f"Motion.{name}: a duration of {over_s:g} s is not possible; give seconds above 0.")
+    return over_s / steps
+
+
+def _cut(part: str, end: str) -> tuple[str, str | None]:
+    """A step without such an end, and the end's number; None where it does not end so."""
+    found = re.search(end + "$", part, re.IGNORECASE)
+    return (part[:found.start()], found[1]) if found else (part, None)
+
+
+def _read(part: str, number: str) -> float:
+    try:
+        return float(number)
+    except ValueError:
+        raise InputError(f"motion: {number!r} in the step {part!r} is no number; {_HINT}.") from None

@@ -40,6 +40,8 @@ class LawCard:
 
 def law_card(law: Law | None, *, no_term: float, dialect: str) -> LawCard:
     """The `LawCard` of a law. `no_term`: the D_i (1/MPa) with which the dialect leaves a volumetric term out."""
+    if law is not None and law.inelastic is not None:
+        raise InputError(f"The law {law.name!r} softens or relaxes ('mullins', 'prony'), which decks do not take; leave these out.")
     if law is not None and law.name in _FOAMS:
         names = _FOAMS[law.name]
         return LawCard(f"N={len(names) // 3}", tuple(law.parameters[name] for name in names), keyword="HYPERFOAM")

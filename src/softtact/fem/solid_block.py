@@ -30,7 +30,8 @@ from softtact.fem import kernels
 from softtact.fem.elements import HEX20, HEX27, WEDGE18, reference_gradients
 from softtact.fem.kernels import ElementArrays, VolumePenalties, VolumeResponse, add_penalties, project
 from softtact.linalg.workers import SERIAL, Workers, slices, unique_rows
-from softtact.materials.laws.base import Law
+from softtact.materials.inelastic import PointHistory
+from softtact.materials.laws.base import IsochoricResponse, Law
 from softtact.materials.laws.stretches import stretch_range
 
 _NONE = np.zeros((0, 0))
@@ -59,7 +60,8 @@ class SolidBlock:
     them, by default a different one for each; basis (g, p): functions on which the volume change is projected (`pressure_modes`);
     unprojected_penalty_ratio: k / mu; quartic_penalty_ratio: q / mu.
     Displacements are given per element (e, m, 3) in mm. at_rest: the arrays as `ElementArrays`. loops: the implementation of the
-    sums over points and nodes, `kernels` or a `DeviceKernels`.
+    sums over points and nodes, `kernels` or a `DeviceKernels`. history: what the points of an inelastic law remember; without one
+    the law is that of first loading.
     """
 
     loops = kernels
@@ -90,48 +92,75 @@ class SolidBlock:
         penalties = VolumePenalties(self.unprojected_modulus, self.quartic_modulus)
         return self.law.volumetric.with_modulus(self.law.projected_modulus - penalties.unprojected), penalties
 
+    def isochoric(self, C6: np.ndarray, *, tangent: bool, history: PointHistory | None = None) -> IsochoricResponse:
+        """The law's response at points with C6 (n, 6), with what they remember."""
+        elastic = self.law.isochoric(C6, tangent=tangent)
+        return elastic if history is None else self.law.inelastic.response(history, elastic, C6)    # type: ignore[union-attr]
+
     def evaluate(self, displacement: np.ndarray, elements: np.ndarray | slice = slice(None), *,
-                 workers: Workers = SERIAL) -> BlockState | None:
-        """Energies and internal forces of the chosen elements; None if one is inverted (J <= 0 at a quadrature point)."""
-        shapes = self.at_rest.shapes[elements]
-        parts = workers.map(lambda part: self._evaluate(displacement[part], self.at_rest._replace(shapes=shapes[part])),
+                 workers: Workers = SERIAL, history: PointHistory | None = None) -> BlockState | None:
+        """Energies and internal forces of the chosen elements; None if one is inverted (J <= 0 at a quadrature point).
+
+        history: of all points of the block
+        """
+        shapes, history = self.at_rest.shapes[elements], self._of(history, elements)
+        parts = workers.map(lambda part: self._evaluate(displacement[part], self.at_rest._replace(shapes=shapes[part]),
+                                                        self._of(history, part)),
                             slices(len(shapes), _AT_ONCE))
         if any(part is None for part in parts):
             return None
         energies, forces = zip(*parts, strict=True)
         return BlockState(energies=np.concatenate(energies), force=np.concatenate(forces), displacement=displacement)
 
-    def _evaluate(self, displacement, at_rest):
+    def _of(self, history, elements):
+        return None if history is None else history.part(elements, self.at_rest.gradients.shape[1])
+
+    def _evaluate(self, displacement, at_rest, history):
         deformed = self.loops.deformation(displacement, at_rest)
         if not deformed.J.min() > 0:
             return None
-        response, volume = self.law.isochoric(deformed.C, tangent=False), self._volumetric(deformed.J, at_rest)
+        response, volume = self.isochoric(deformed.C, tangent=False, history=history), self._volumetric(deformed.J, at_rest)
         if volume is None:
             return None
         energies = (at_rest.volumes[at_rest.shapes] * response.energy.reshape(deformed.J.shape)).sum(axis=1) + volume.energies
         return energies, self.loops.internal_force(deformed, at_rest, response.stress, volume.pressure)
 
     def tangent(self, displacement: np.ndarray, elements: np.ndarray | slice = slice(None), *,
-                precision: type[np.floating] = np.float64) -> np.ndarray:
+                precision: type[np.floating] = np.float64, history: PointHistory | None = None) -> np.ndarray:
         """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given.
 
         precision: float32 takes two thirds of the time, for steps that are corrected by a residual in double precision
+        history: of all points of the block
         """
         at_rest = self.at_rest._replace(shapes=self.at_rest.shapes[elements])
         deformed = self.loops.deformation(displacement, at_rest)
-        response, volume = self.law.isochoric(deformed.C, tangent=True), self._volumetric(deformed.J, at_rest)
+        history = self._of(history, elements)
+        response, volume = self.isochoric(deformed.C, tangent=True, history=history), self._volumetric(deformed.J, at_rest)
         return self.loops.tangent(deformed, at_rest, response.stress, response.tangent, volume,     # type: ignore[arg-type]
                                   np.empty(0, precision))
 
     def add_tangent(self, values: np.ndarray, positions: np.ndarray, displacement: np.ndarray, *,
-                    workers: Workers = SERIAL) -> None:
+                    workers: Workers = SERIAL, history: PointHistory | None = None) -> None:
         """Add the tangent of all elements to a matrix's values, see `assembly.add_upper`; only with loops that sum on a device."""
         deformed = self.loops.deformation(displacement, self.at_rest)
-        parts = workers.map(lambda part: self.law.isochoric(deformed.C[part], tangent=True),
+        parts = workers.map(lambda part: self.isochoric(deformed.C[part], tangent=True,
+                                                        history=history and history.part(part, 1)),
                             slices(len(deformed.C), _POINTS_AT_ONCE))
         stress, moduli = (np.concatenate([getattr(part, name) for part in parts]) for name in ("stress", "tangent"))
         volume = self._volumetric(deformed.J, self.at_rest)
         self.loops.add_tangent(values, positions, deformed, self.at_rest, stress, moduli, volume)     # type: ignore[attr-defined]
+
+    def never_loaded(self) -> PointHistory | None:
+        """The history of all points before any load; None for an elastic law."""
+        inelastic, points = self.law.inelastic, len(self.at_rest.shapes) * self.at_rest.gradients.shape[1]
+        return None if inelastic is None else inelastic.at_rest(points)
+
+    def history_after(self, history: PointHistory | None, displacement: np.ndarray, seconds: float) -> PointHistory | None:
+        """The history at the end of an increment with displacement (e, m, 3) in mm, from which one of `seconds` begins."""
+        if history is None:
+            return None
+        elastic = self.law.isochoric(self.loops.deformation(displacement, self.at_rest).C, tangent=False)
+        return self.law.inelastic.after(history, elastic, seconds)      # type: ignore[union-attr]
 
     @property
     def volume(self) -> float:

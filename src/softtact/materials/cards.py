@@ -9,6 +9,7 @@ from softtact.errors import InputError
 from softtact.files import digest, read_json, write_json
 from softtact.materials.config import validated
 from softtact.materials.curves import principal_window
+from softtact.materials.inelastic import Inelastic
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import FOAM_LAWS, make_law
 from softtact.materials.linear import LinearConstants
@@ -24,7 +25,7 @@ class _CardLaw(pydantic.BaseModel):
     bulk_modulus_mpa: pydantic.FiniteFloat | None = None
 
 
-class _CardMullins(pydantic.BaseModel):
+class CardMullins(pydantic.BaseModel):
     """The constants of the Mullins effect."""
 
     model_config = pydantic.ConfigDict(strict=True)
@@ -33,7 +34,7 @@ class _CardMullins(pydantic.BaseModel):
     beta: pydantic.FiniteFloat
 
 
-class _CardProny(pydantic.BaseModel):
+class CardProny(pydantic.BaseModel):
     """The Prony series of the shear modulus."""
 
     model_config = pydantic.ConfigDict(strict=True)
@@ -51,8 +52,8 @@ class _Card(pydantic.BaseModel):
     chosen: str
     laws: dict[str, _CardLaw]
     strain_window: dict[str, Annotated[list[pydantic.PositiveFloat], pydantic.Field(min_length=2, max_length=2)]] = {}
-    mullins: _CardMullins | None = None
-    prony: _CardProny | None = None
+    mullins: CardMullins | None = None
+    prony: CardProny | None = None
 
 
 def write_card(path: str | Path, card: dict[str, Any]) -> None:
@@ -72,7 +73,7 @@ def load_card(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: not a material card, it lacks {', '.join(missing)}; write it with `softtact fit`.")
     validated(_Card, card, where=str(path))
     try:
-        mullins_from_card(card), prony_from_card(card)
+        inelastic_of(card)
     except InputError as error:     # of constants: the message does not name the file
         raise InputError(f"{path}: {error}") from None
     return card
@@ -81,13 +82,19 @@ def load_card(path: str | Path) -> dict[str, Any]:
 def mullins_from_card(card: dict[str, Any]) -> Mullins | None:
     """The `Mullins` softening of a card, which acts on its chosen law; None for a card without."""
     block = card.get("mullins")
-    return None if block is None else Mullins(**_CardMullins(**block).model_dump())
+    return None if block is None else Mullins(**CardMullins(**block).model_dump())
 
 
 def prony_from_card(card: dict[str, Any]) -> PronySeries | None:
     """The `PronySeries` of a card; None for a card without."""
     block = card.get("prony")
-    return None if block is None else PronySeries(**_CardProny(**block).model_dump())
+    return None if block is None else PronySeries(**CardProny(**block).model_dump())
+
+
+def inelastic_of(card: dict[str, Any]) -> Inelastic | None:
+    """Softening and relaxation of a card, or of the blocks `mullins` and `prony` alone; None without both."""
+    mullins, prony = mullins_from_card(card), prony_from_card(card)
+    return Inelastic(mullins, prony) if mullins or prony else None
 
 
 def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
@@ -103,6 +110,7 @@ def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
     except InputError as error:     # of constants: the message does not name the card
         raise InputError(f"The card of material {card['material']}: {error}") from None
     made.stretch_window = principal_window(card.get("strain_window", {}))
+    made.inelastic = inelastic_of(card)
     return made
 
 

@@ -4,6 +4,7 @@ Symbols       W isochoric energy of the law at first loading (MPa = mJ/mm^3), W_
               r > 1 (1), m >= 0 (MPa), beta >= 0 (1), not both zero
 Softening     eta = 1 - erf(x)/r with x = (W_max - W)/(m + beta W_max); the stress is eta times that of first loading
 Derivative    d eta/dW = 2 exp(-x^2) / (sqrt(pi) r (m + beta W_max)) below W_max
+Energy        int eta dW, which is W_max at W = W_max: W + (m + beta W_max) (x erf(x) + (exp(-x^2) - 1)/sqrt(pi))/r
 Limits        eta = 1 where W = W_max; eta > 1 - 1/r
 References    Ogden and Roxburgh, Proc. R. Soc. A 455 (1999) 2861-2877 (beta = 0); Abaqus Analysis User's Guide, Mullins effect
 """
@@ -48,6 +49,13 @@ class Mullins:
         argument, width = self._argument(energy, greatest_energy)
         slope = 2 / math.sqrt(math.pi) * np.exp(-argument**2) / (self.r * width)
         return np.where(np.asarray(energy) < greatest_energy, slope, 0.0)
+
+    def energy(self, energy: np.ndarray, greatest_energy: np.ndarray) -> np.ndarray:
+        """The integral of eta by W (...) in MPa at constant W_max, equal to W where W is no smaller than W_max."""
+        x, width = self._argument(energy, greatest_energy)
+        lost = x * erf(x) + np.expm1(-(x**2)) / math.sqrt(math.pi)
+        found: np.ndarray = energy + width * lost / self.r
+        return found
 
     def _argument(self, energy, greatest_energy):
         """x and m + beta W_max."""

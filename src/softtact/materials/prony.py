@@ -2,6 +2,8 @@
 
 Symbols       G0 instantaneous shear modulus; g_i shares of it (1) that relax with the times tau_i (s); g_inf = 1 - sum g_i
 Relaxation    G(t)/G0 = g_inf + sum g_i exp(-t/tau_i)
+Creep         under a constant load, of a body of this material alone: c(t) = G0 g_inf J(t), from g_inf to 1,
+              c(t) = 1 - sum c_j exp(-t/T_j): h' = -(I + g 1^T/g_inf)^-1 diag(1/tau) h from h(0) = g, and c = 1 - sum h_i
 Frequency     G'/G0 = g_inf + sum g_i w^2 tau_i^2/(1 + w^2 tau_i^2),  G''/G0 = sum g_i w tau_i/(1 + w^2 tau_i^2),  w = 2 pi f
 References    Ferry, Viscoelastic Properties of Polymers (1980), chapter 3; Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153-173
 """
@@ -55,6 +57,24 @@ class PronySeries:
         """G(t)/G0 (...) at the times (...) after a step of strain, s."""
         decays = np.exp(-np.asarray(time_s, float)[..., None] / np.array(self.tau_s))
         return self.relaxed_share + decays @ np.array(self.g)
+
+    def retardation(self) -> tuple[np.ndarray, np.ndarray]:
+        """(c_j, T_j), each (n,): shares (1) of the strain under a constant load that come late, and their times in s.
+
+        By the eigenvalues of a symmetric matrix; they interlace with the relaxation times: tau_1 < T_1 < tau_2 < ...
+        """
+        g, tau = np.array(self.g), np.array(self.tau_s)
+        root = np.sqrt(g)
+        mixed = np.eye(len(g)) - np.outer(root, root)     # (I + root root^T/g_inf)^-1, by Sherman and Morrison
+        half = 1 / np.sqrt(tau)
+        rates, vectors = np.linalg.eigh(half[:, None] * mixed * half)
+        shares = self.relaxed_share * (vectors.T @ (root * half)) ** 2 / rates
+        return shares, 1 / rates
+
+    def creep(self, time_s: float | np.ndarray) -> np.ndarray:
+        """c(t) (...) at the times (...) after a constant load began, s: the strain over that after a long time."""
+        shares, times = self.retardation()
+        return 1 - np.exp(-np.asarray(time_s, float)[..., None] / times) @ shares
 
     def storage_loss(self, omega: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(G'/G0, G''/G0), each (...), at the angular frequencies omega (...) in rad/s."""

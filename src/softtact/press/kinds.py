@@ -20,6 +20,7 @@ from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_plain_body, build_sensor_body
 from softtact.press import choice
+from softtact.press.creep import at_times, refuse_creep, slow_press
 from softtact.press.fast import press_elastic_motion
 from softtact.press.gel import press_gel
 from softtact.press.hyperelastic import press_hyperelastic
@@ -90,7 +91,7 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
                          "rigid mesh.")
     if sensor.spec.edge.far and model == "elastic":
         return _by_motion(sensor, task, press_gel)
-    if task.motion.forces_n is not None:
+    if _by_force_alone(task.motion):
         return _by_forces(sensor, task, choice.PRESSES[model], threads=task.control.threads if model == "elastic" else 1)
     motions = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
     if model not in motions:
@@ -112,7 +113,7 @@ def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
         return replace(result, selection_reason="a gel's sides are far: the elastic model, which gives traction and slip")
     if task.soft or task.motion.turns or task.motion.loaded_aside:
         return press_pad(sensor, task)
-    if task.motion.forces_n is None:
+    if not _by_force_alone(task.motion):
         return _by_motion(sensor, task, press_hyperelastic)
     return _by_forces(sensor, task, partial(choice.press_auto, policy=task.policy, tolerance_mm=task.tolerance_mm))
 
@@ -122,11 +123,25 @@ def _flat(motion):
     return not any({*step.ways} & {"rx", "ry"} or {*step.loads} - {"z"} for step in motion.steps)
 
 
+def _by_force_alone(motion):
+    """Whether a motion presses straight down by force, in steps of which some may hold it for a time."""
+    return motion.forces_n is not None or motion.times_s is not None and motion.held_forces_n is not None
+
+
 def _by_forces(sensor, task, press, *, threads=1):
-    """A press straight down by increasing forces."""
+    """A press straight down by increasing forces; with durations, over time."""
+    complete = None
+    if (motion := task.motion).times_s is not None:
+        slow, load_step, effective_n = slow_press(motion, sensor.spec.creep)
+        task, complete = replace(task, motion=slow), partial(at_times, load_step=load_step, effective_n=effective_n, motion=motion)
     forces = checked_forces(task.motion.forces_n, sensor.spec.force_range_n, sensor.spec.name)
     placed, finish = _placed(sensor, task)
-    task.control.reached.finish = lambda result: finish(choice.with_expected_error(sensor, result))
+
+    def finished(result: PressResult) -> PressResult:
+        result = finish(choice.with_expected_error(sensor, result))
+        return complete(result) if complete else result
+
+    task.control.reached.finish = finished
     # With more threads, dense products of some hundred rows wait for each other and take up to five times as long.
     with threadpool_limits(limits=threads):
         return task.control.reached.finish(press(sensor, placed, forces, task.control))
@@ -134,8 +149,14 @@ def _by_forces(sensor, task, press, *, threads=1):
 
 def _by_motion(sensor, task, press, *, threads=1):
     """A press along a motion other than straight down by increasing forces."""
+    times = refuse_creep(sensor.spec, task.motion)
     placed, finish = _placed(sensor, task)
-    task.control.reached.finish = lambda result: finish(flag_overloaded(result, sensor.spec.force_range_n[1]))
+
+    def finished(result: PressResult) -> PressResult:
+        result = finish(flag_overloaded(result, sensor.spec.force_range_n[1]))
+        return result if times is None else replace(result, time_s=times[:result.steps])
+
+    task.control.reached.finish = finished
     with threadpool_limits(limits=threads):
         return task.control.reached.finish(press(sensor, placed, task.motion, task.control))
 

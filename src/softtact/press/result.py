@@ -83,6 +83,8 @@ class PressResult:
     """(step,) 1 where the solver reached its tolerance."""
     within_validity: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) 0 where the numbers are not to be relied on, for the `validity_reason`."""
+    time_s: np.ndarray | None = field(default=None, metadata=_array("s", "step") | _LATER)
+    """(step,) in s: from the start of the motion to the step's end; None where its steps have no durations."""
     wall_time_s: np.ndarray
     """(step,) in s: wall time of the load step; the solver's preparation counts to the first. Files hold it as an attribute, since
     two runs of one press differ in it alone."""

@@ -146,11 +146,22 @@ class Sensor:
     def prepared(self, model: str, threads: int = 1) -> Any:
         """Prepared data of a fast model: `Compliance`, `WideLayer` of a gel, or `FoundationCompliance`, computed on first use."""
         self.spec.check_for(model)
+        if model == "foundation":
+            self.need_elastic("foundation model")
         if model not in self.prepared_models:
             self.prepared_models[model] = (cached_foundation(self.spec, self.laws, threads=threads) if model != "elastic"
                                            else wide_layer(self.spec) if self.spec.edge.far
                                            else cached_compliance(self.spec, threads=threads))
         return self.prepared_models[model]
+
+    def need_elastic(self, what: str, layers: Sequence[str] | None = None) -> None:
+        """Raise InputError where the material of one of the layers, by default of any, softens or relaxes: `what` is elastic."""
+        for layer in layers or self.laws:
+            if self.laws[layer].inelastic is not None:
+                raise InputError(
+                    f"{self.spec.name}: the material of {layer!r} softens or relaxes ('mullins', 'prony'), and the {what} has "
+                    "elastic materials; use model='solid' on a sensor without frusta or of kind solid, or a card without them; a "
+                    "sensor whose layers relax alike states 'relaxation' in its file.")
 
     def seconds_to_prepare_foundation(self) -> float:
         """About how long the foundation model's `prepared` takes; 0 where it is there."""
@@ -160,6 +171,7 @@ class Sensor:
 
     def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
         """The `LayeredBody` that the hyperelastic model presses on."""
+        self.need_elastic("hyperelastic model")
         build, device = KINDS[self.spec.kind].body, find_device(self.device)
         if build is None:
             raise InputError(f"{self.spec.name} has no layers, which the hyperelastic model needs; use the solid model.")

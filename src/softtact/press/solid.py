@@ -25,8 +25,9 @@ from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.newton import SolidSettings
-from softtact.models.solid.path import SolidLoadStep, SolidPath
+from softtact.models.solid.path import SolidLoadStep, SolidPath, times_of
 from softtact.models.solid.result import gathered
+from softtact.press.creep import refuse_creep
 from softtact.press.making import layered_surface
 from softtact.press.objects import OBJECT, PlacedObject, SoftObject, distance_to_touch, first_direction
 from softtact.press.reached import Reached
@@ -60,6 +61,7 @@ def press_pad(sensor: "Sensor", task: PressTask) -> PressResult:
     Raises InputError where the object misses the sensor, ConvergenceError where a step is not reached.
     """
     control = task.control
+    refuse_creep(sensor.spec, task.motion)
     pad = SolidPad(sensor)
     if isinstance(task.pressed, SoftObject):
         placed = task.pressed.placed(task.pose, pad.height_mm, pad.shell)
@@ -303,4 +305,4 @@ def result_of_steps(body: SolidBody, steps: list[SolidLoadStep], *, sensor: str 
         extrapolated_volume_fraction=each(lambda step: step.extrapolated_volume_fraction),
         iterations=each(lambda step: step.iterations), converged=np.ones(len(steps), dtype=np.int8),
         within_validity=np.ones(len(steps), dtype=np.int8), wall_time_s=each(lambda step: step.wall_time_s),
-        readings=readings or {}, attributes=attributes or {}, solid=fields)
+        time_s=times_of(steps), readings=readings or {}, attributes=attributes or {}, solid=fields)

@@ -20,7 +20,7 @@ from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.models.hyperelastic.deformed_mesh import Cells, PressedBody
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.frusta import FrustumItem
-from softtact.models.solid.path import SolidLoadStep
+from softtact.models.solid.path import SolidLoadStep, times_of
 from softtact.press.cache import cached_frustum_law
 from softtact.press.making import make_result, shell_of
 from softtact.press.objects import OBJECT, SoftObject
@@ -183,6 +183,7 @@ class SolidPad:
 
     def _frustum_law(self) -> FrustumLaw:
         """The law of frusta with bonded tips; the item lets tips slide where they may."""
+        self.sensor.need_elastic("frusta", ["dielectric"])
         known = self.sensor.prepared_models.get("frustum")
         return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"])
 
@@ -224,6 +225,7 @@ class SolidPad:
         made = make_result(
             self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, flags=flags, **numbers
         )
+        made = replace(made, time_s=times_of(steps))
         return replace(made, bodies=tuple(self._pressed_body(body, step) for step in steps)) if keep_body else made
 
     def _pressed_body(self, body: SolidBody, step: SolidLoadStep) -> PressedBody:

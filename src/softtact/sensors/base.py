@@ -9,7 +9,16 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, P
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, FiniteSection, Sides, Taxels
+from softtact.sensors.fields import (
+    CalibrationBlock,
+    Edge,
+    EdgeField,
+    ElasticLayer,
+    FiniteSection,
+    Relaxation,
+    Sides,
+    Taxels,
+)
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 DEFAULT_KIND = "frusta"     # of a file that states none
@@ -74,9 +83,9 @@ class Specification(FiniteSection):
             raise InputError(f"{where}, at 'force_range_n': {[low, high]} is no range; write [least, largest] in N.")
 
     @model_serializer(mode="wrap")
-    def _without_default_readouts(self, handler: Any) -> dict[str, Any]:
+    def _without_defaults(self, handler: Any) -> dict[str, Any]:
         values: dict[str, Any] = handler(self)
-        return values if self.readouts else {name: value for name, value in values.items() if name != "readouts"}
+        return {name: value for name, value in values.items() if value or name not in ("readouts", "relaxation")}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Self:
@@ -115,6 +124,19 @@ class BaseSpec(Specification):
     elastic_layer: ElasticLayer
     edge: EdgeField = Edge()
     calibration: CalibrationBlock | None = None
+    relaxation: Relaxation | None = Field(None, description="of the stiffness of the whole sensor; its moduli are the relaxed ones")
+
+    @property
+    def creep(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Shares (n,) of the deformation under a held force that come late, and their times (n,) in s; None where nothing creeps.
+
+        From `relaxation`, or as its `calibration` found them.
+        """
+        if self.relaxation is not None:
+            return self.relaxation.series.retardation()
+        if self.calibration is None or not self.calibration.relaxation:
+            return None
+        return np.array(self.calibration.relaxation), np.array(self.calibration.relaxation_s)
 
     @property
     def thickness_mm(self) -> float:
@@ -205,7 +227,15 @@ class BaseSpec(Specification):
         if np.isfinite(below) and below >= self.held_height_mm:
             raise InputError(f"{where}, at 'edge.held.sides_below_mm': {below:g} mm is not less than the height of the layers, "
                              f"{self.held_height_mm:g} mm, so nothing is held; make it smaller, or write 'held: free'.")
+        if self.relaxation is not None:
+            try:
+                self.relaxation.series.retardation()
+            except InputError as error:
+                raise InputError(f"{where}, at 'relaxation': {str(error).removeprefix('prony: ')}") from None
         if self.calibration is not None:
+            if self.relaxation is not None and self.calibration.relaxation:
+                raise InputError(f"{where}, at 'relaxation': its calibration holds the creep that was measured; leave one of them "
+                                 "out.")
             taxels = self.need_taxels("a calibration")
             if fault := self.calibration.fault(taxels.rows, taxels.columns):
                 raise InputError(f"{where}: {fault}; calibrate the sensor again.")

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt
 
+from softtact.materials.prony import RELAXED, PronySeries
 from softtact.unknown_names import Section
 
 T = TypeVar("T")
@@ -135,6 +136,18 @@ EdgeField = Annotated[Edge, BeforeValidator(_short)]
 
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class Relaxation(FiniteSection):
+    """Prony series by which the stiffness of a whole sensor relaxes; its moduli are those after a long time."""
+
+    g: tuple[float, ...] = Field(description="shares of the instantaneous stiffness that relax")
+    tau_s: tuple[float, ...] = Field(description="their times")
+
+    @property
+    def series(self) -> PronySeries:
+        """The series. Raises InputError for shares and times that are none."""
+        return PronySeries(self.g, self.tau_s, RELAXED)
 
 
 class CalibrationBlock(FiniteSection):

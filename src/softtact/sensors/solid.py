@@ -4,6 +4,7 @@
     kind: solid
     mesh: {file: dome.vtu}                   # of `softtact mesh`; another program's mesh states its unit
     regions: {body: {material: neoprene}}    # or {card: my_card.json}, or {law: neo_hooke, parameters: {c10: 0.1}}
+                                             # and {..., prony: {g: [0.2], tau_s: [1.0], moduli: relaxed}}
     faces: {base: "z<0.01", skin: "z>0.01"}  # outer facets by rules, beside those that the mesh file names
     held: {base: xyz}
     contact: {face: skin, friction: 0.3}
@@ -17,7 +18,7 @@ from typing import Annotated, Literal, NoReturn
 from pydantic import Field, PositiveFloat
 
 from softtact.errors import InputError
-from softtact.materials.cards import law_from_card, load_card
+from softtact.materials.cards import CardMullins, CardProny, inelastic_of, law_from_card, load_card
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
@@ -44,6 +45,8 @@ class Region(FiniteSection):
     law: str | None = Field(None, description="name of the law; of a material, the one whose printed constants are taken")
     parameters: dict[str, float] | None = None
     bulk_over_shear: PositiveFloat | None = None
+    prony: CardProny | None = Field(None, description="relaxation, beside a law without")
+    mullins: CardMullins | None = Field(None, description="softening of the first cycles, beside a law without")
 
 
 class ContactFace(FiniteSection):
@@ -100,6 +103,12 @@ class SolidSpec(Specification):
     def law_of(self, name: str) -> Law:
         """The law of a region. Raises InputError where its material, card or constants give no law."""
         region = self.regions[name]
+        law = self._law_at_first_loading(region)
+        if region.prony or region.mullins:
+            law.inelastic = inelastic_of(region.model_dump(include={"prony", "mullins"}))
+        return law
+
+    def _law_at_first_loading(self, region: Region) -> Law:
         if region.card:
             return law_from_card(load_card(self._folder / region.card), region.law)
         if region.material:
@@ -127,6 +136,8 @@ def _region_fault(region: Region) -> str | None:
     given = [name for name in _SOURCES if getattr(region, name) is not None]
     if not given:
         return "it has no law; give 'material', 'card', or 'law' with 'parameters'."
+    if region.card and (region.prony or region.mullins):
+        return "a card states its own 'prony' and 'mullins'; write them there, or leave them out."
     if region.material and region.card:
         return "it has a material and a card; leave one of them out."
     plain = given == ["law"]

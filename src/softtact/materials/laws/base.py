@@ -7,13 +7,16 @@ The whole energy is psi + U(J), with U the law's volumetric function (`volumetri
 
 import warnings
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from scipy.optimize import brentq
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.materials.laws.volumetric import Quadratic, VolumetricFunction
+
+if TYPE_CHECKING:
+    from softtact.materials.inelastic import Inelastic
 
 # Exponents (e1, e2, e3) of the incompressible test paths: l_k = stretch ** e_k. Direction 3 is always free of stress.
 TEST_PATHS = {
@@ -56,9 +59,11 @@ class Law:
 
     volumetric: U, a `VolumetricFunction`
     stretch_window: lowest and highest principal stretch of the fitted data; None where not known
+    inelastic: softening and relaxation beside the law, which is that of first loading; None for an elastic material
     """
 
     stretch_window: tuple | None = None
+    inelastic: "Inelastic | None" = None
     name: str
     constants: tuple[Parameter, ...]
 
@@ -88,6 +93,7 @@ class Law:
         values = {one.name: self.parameters[one.name] * (factor if one.unit == "MPa" else 1.0) for one in self.constants}
         law = type(self)(values, bulk_modulus=factor * self.bulk_modulus, volumetric=type(self.volumetric))
         law.stretch_window = self.stretch_window
+        law.inelastic = self.inelastic and self.inelastic.scaled(factor)
         return law
 
     @property

@@ -27,6 +27,7 @@ from softtact.fem.solid_block import SolidBlock
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.linalg.refined import RefinedSolver
 from softtact.linalg.workers import Workers, slices
+from softtact.materials.inelastic import PointHistory
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import bodies_of, lift_from_corners, refuse_loose, region_blocks, sum_on
 from softtact.models.solid.frames import FramePose, make_frames
@@ -55,9 +56,11 @@ class SolidState:
     energy: float
     """In mJ: of regions and frusta, and the penalties."""
     strain_energy: float
-    """In mJ: of regions and frusta."""
+    """In mJ: of regions and frusta; of a law that softens or relaxes, the potential of the increment."""
     size: float
     """In N: sum of what presses and holds, the scale of the residual."""
+    memories: tuple[PointHistory | None, ...] = ()
+    """Of each block of elements: what its points remember as the increment began; None where the law is elastic."""
 
     @property
     def item_histories(self) -> tuple[Any, ...]:
@@ -193,19 +196,23 @@ class SolidBody:
         histories: tuple[Any, ...],
         before: SolidState | None = None,
         *,
+        memories: tuple[PointHistory | None, ...] | None = None,
         nearby: bool = False,
     ) -> SolidState | None:
         """`SolidState` with the frames' nodes where the poses (one a frame) put them; None where an element is inside out.
 
         histories: of each item;  before: the state that this one follows on, with the same histories;  nearby: see `Item.evaluate`
+        memories: of each block, by default those of `before`, and those of a body that was never loaded
         """
+        if memories is None:
+            memories = before.memories if before else tuple(block.never_loaded() for _, _, block in self.blocks)
         displacement = displacement.copy()
         for frame, pose in zip(self.frames, poses, strict=True):
             axes = ["xyz".index(axis) for axis in frame.axes]
             displacement[frame.carried] = pose.displacement(frame, self.points)[:, axes]
         force, strain_energy, penalty = np.zeros_like(displacement), 0.0, 0.0
-        for _, nodes, block in self.blocks:
-            state = block.evaluate(displacement[nodes], workers=self.workers)
+        for (_, nodes, block), memory in zip(self.blocks, memories, strict=True):
+            state = block.evaluate(displacement[nodes], workers=self.workers, history=memory)
             if state is None:
                 return None
             strain_energy += state.energy
@@ -218,13 +225,28 @@ class SolidBody:
             totals = item.totals(history, response)
             strain_energy, penalty, size = strain_energy + totals.strain_energy, penalty + totals.penalty, size + totals.size
             items.append(ItemState(history, response))
-        return SolidState(displacement, poses, tuple(items), force, strain_energy + penalty, strain_energy, size)
+        return SolidState(displacement, poses, tuple(items), force, strain_energy + penalty, strain_energy, size, memories)
 
-    def with_histories(self, state: SolidState, histories: Iterable[Any]) -> SolidState:
-        """The same places with other histories; every point of contact finds anew which facet it meets."""
-        found = self.evaluate(state.displacement, state.poses, tuple(histories))
+    def with_histories(self, state: SolidState, histories: Iterable[Any],
+                       memories: tuple[PointHistory | None, ...] | None = None) -> SolidState:
+        """The same places with other histories; every point of contact finds anew which facet it meets.
+
+        memories: of each block, by default those of the state
+        """
+        memories = state.memories if memories is None else memories
+        found = self.evaluate(state.displacement, state.poses, tuple(histories), memories=memories)
         assert found is not None
         return found
+
+    def memories_after(self, state: SolidState, seconds: float) -> tuple[PointHistory | None, ...]:
+        """What the points of each block remember of a balanced state, as an increment of so many seconds begins."""
+        return tuple(block.history_after(memory, state.displacement[nodes], seconds)
+                     for (_, nodes, block), memory in zip(self.blocks, state.memories, strict=True))
+
+    @property
+    def shortest_relaxation_s(self) -> float:
+        """The shortest relaxation time of its materials in s; infinite where none relaxes."""
+        return min((law.inelastic.shortest_s for law in self.laws.values() if law.inelastic), default=np.inf)
 
     def item_states(self, state: SolidState) -> Iterator[tuple[Item, Any, Any]]:
         """(item, history, response) one after the other."""
@@ -353,17 +375,18 @@ class SolidBody:
         x = self.points + state.displacement
         coupled = [part for item, *both in self.item_states(state) for part in item.tangents(*both, x, turning=turning)]  # type: ignore[misc]
         matrix = self._matrix_for(coupled)
-        self._add_blocks(matrix.data, state.displacement)
+        self._add_blocks(matrix.data, state)
         for nodes, matrices in coupled:
             add_upper(matrix.data, matrices, self._pattern.positions(nodes))  # type: ignore[union-attr]
         return matrix
 
-    def _add_blocks(self, values, displacement):
-        for (_, nodes, block), positions in zip(self.blocks, self._positions, strict=True):
+    def _add_blocks(self, values, state):
+        displacement = state.displacement
+        for (_, nodes, block), positions, memory in zip(self.blocks, self._positions, state.memories, strict=True):
             if hasattr(block.loops, "add_tangent"):
-                block.add_tangent(values, positions, displacement[nodes], workers=self.workers)
+                block.add_tangent(values, positions, displacement[nodes], workers=self.workers, history=memory)
                 continue
-            tangents, parts = partial(_tangents, block, nodes, displacement), slices(len(nodes), _CHUNK)
+            tangents, parts = partial(_tangents, block, nodes, displacement, memory), slices(len(nodes), _CHUNK)
             for start in range(0, len(parts), self.workers.threads):  # in turns, so that few are in memory at once
                 several = parts[start : start + self.workers.threads]
                 for part, matrices in zip(several, self.workers.map(tangents, several), strict=True):
@@ -382,6 +405,7 @@ class SolidBody:
         return self._matrix
 
 
-def _tangents(block: SolidBlock, nodes: np.ndarray, displacement: np.ndarray, part: slice) -> np.ndarray:
+def _tangents(block: SolidBlock, nodes: np.ndarray, displacement: np.ndarray, history: PointHistory | None,
+              part: slice) -> np.ndarray:
     """Tangents of some of a block's elements."""
-    return block.tangent(displacement[nodes[part]], part)
+    return block.tangent(displacement[nodes[part]], part, history=history)

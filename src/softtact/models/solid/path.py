@@ -15,6 +15,7 @@ from softtact.models.solid.newton import SolidSettings, Target, balance
 
 _OVERLAP_MM = 1e-3  # overlap of a loaded object with the surface before its load acts, so that contact resists it
 _FAST = 8  # iterations of an increment up to which the next one may be larger
+_RELAXED = 0.5  # of the shortest relaxation time, or of the time since the last change of rate: longest increment of what relaxes
 
 
 @dataclass(frozen=True)
@@ -44,14 +45,17 @@ class SolidLoadStep:
     work_mj: float
     """Work in mJ of frames and pressures up to this step's end, by the trapezoidal rule over the increments."""
     wall_time_s: float
-    """Time in s that the step took."""
+    """Wall time in s that solving the step took."""
+    time_s: float
+    """From the path's start to the step's end in s; nan where steps have no durations."""
 
 
 @dataclass
 class SolidPath:
     """Steps of frames {name: `Motion`} and pressures {name: MPa at each step's end}, all of as many steps.
 
-    A loaded freedom is first moved along its load until surfaces touch.
+    A loaded freedom is first moved along its load until surfaces touch. Steps take the durations of the motions, or `seconds`
+    (steps,); without any, what relaxes has relaxed at each step's end.
     """
 
     body: SolidBody
@@ -59,6 +63,7 @@ class SolidPath:
     pressures: Mapping[str, Sequence[float]] = field(default_factory=dict)
     settings: SolidSettings = SolidSettings()
     tell: Callable[[str], None] = lambda text: None
+    seconds: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         names, faces = [frame.name for frame in self.body.frames], [face.name for face in self.body.pressures]
@@ -71,6 +76,19 @@ class SolidPath:
                 f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many."
             )
         self.steps = counts.pop()
+        self._times = self._ends()
+
+    def _ends(self) -> np.ndarray | None:
+        """(steps,) in s: the end of each step; None without durations."""
+        ends = [times for motion in self.motions.values() if (times := motion.times_s) is not None]
+        if self.seconds is not None:
+            if len(self.seconds) != self.steps or not np.min(self.seconds) > 0:
+                raise InputError(f"The durations {list(self.seconds)} do not fit {self.steps} steps; give seconds above 0 for "
+                                 "each.")
+            ends.append(np.cumsum(self.seconds))
+        if any(not np.allclose(other, ends[0]) for other in ends):
+            raise InputError("The motions' steps take different times; give the same durations to all.")
+        return ends[0] if ends else None
 
     def run(self, start: SolidState | None = None) -> Iterator[SolidLoadStep]:
         """Yield a `SolidLoadStep` for each step.
@@ -88,7 +106,7 @@ class SolidPath:
             in_contact = True
             values = np.array([self.pressures[face.name][number] for face in self.body.pressures])
             try:
-                state, counts, residual, done, lost = self._step(state, steps, values, f"step {number + 1} of {self.steps}")
+                state, counts, residual, done, lost = self._step(state, steps, values, number)
             except TimeLimitError:
                 raise
             except ConvergenceError as error:
@@ -96,15 +114,17 @@ class SolidPath:
                     f"Step {number + 1} of {self.steps} was not reached: {error} Use smaller steps or a finer mesh where it folds."
                 ) from None
             work, dissipated = work + done, dissipated + lost
-            yield self._described(state, counts, residual, work, dissipated, time.perf_counter() - began)
+            yield self._described(state, counts, residual, work, dissipated, time.perf_counter() - began, number)
 
-    def _step(self, state, steps, pressures, name):
+    def _step(self, state, steps, pressures, number):
         """A step in as many increments as it takes: state, (iterations, increments), residual, work and dissipation in mJ."""
         body, share, size, counts, work, lost = self.body, 0.0, 1.0, [0, 0], 0.0, 0.0
+        name, seconds, held = f"step {number + 1} of {self.steps}", self._duration(number), self._held_before(number)
         first = body.frame_loads(state), state.pressures
         while share < 1 - 1e-9:
-            size = min(size, 1 - share)
-            start = self._increment_start(state)
+            longest = self._longest(seconds, share * seconds + held)
+            size = min(size, 1 - share, longest)
+            start = self._increment_start(state, size * seconds)
             part = name if size == 1 else f"{name}, {100 * share:.3g} to {100 * (share + size):.3g} % of it"
             target = replace(self._target(first, steps, pressures, share, size), name=part)
             try:
@@ -114,7 +134,7 @@ class SolidPath:
             except ConvergenceError as error:
                 size *= 0.5
                 self.tell(f"increment divided: {error}")
-                if size < self.settings.smallest_increment:
+                if size < self.settings.smallest_increment * longest:
                     raise
                 continue
             done, dissipated = self._energies(start, found)
@@ -125,11 +145,34 @@ class SolidPath:
                 size *= 2
         return state, counts, residual, work, lost
 
-    def _increment_start(self, state):
-        """The state from which an increment starts, with the items' histories advanced to it."""
+    def _duration(self, number):
+        """How long a step takes in s; infinite without durations."""
+        return np.inf if self._times is None else float(np.diff(self._times, prepend=0.0)[number])
+
+    def _held_before(self, number):
+        """For how long in s everything was held as a step begins that holds it on; 0 for a step that moves or loads."""
+        held = 0.0
+        while self._holds(number) and self._holds(number - 1):
+            held, number = held + self._duration(number - 1), number - 1
+        return held
+
+    def _holds(self, number):
+        steps = [motion.steps[number] for motion in self.motions.values()]
+        pressed = [values[number] != ([0.0, *values])[number] for values in self.pressures.values()]
+        return number > 0 and not any(step.ways or step.loads for step in steps) and not any(pressed)
+
+    def _longest(self, seconds, since):
+        """The largest share of a step of some duration that an increment may be, so long in s since the last change of rate."""
+        shortest = self.body.shortest_relaxation_s
+        return _RELAXED * max(shortest, since) / seconds if np.isfinite(seconds) and np.isfinite(shortest) else 1.0
+
+    def _increment_start(self, state, seconds):
+        """The state from which an increment of some duration starts, with all histories advanced to it."""
         x = self.body.points + state.displacement
         return self.body.with_histories(
-            state, (item.begin_step(*both, x, self.body.points) for item, *both in self.body.item_states(state))
+            state,
+            (item.begin_step(*both, x, self.body.points) for item, *both in self.body.item_states(state)),
+            self.body.memories_after(state, seconds),
         )
 
     def _target(self, first, steps, pressures, share, size):
@@ -184,10 +227,10 @@ class SolidPath:
             nearer = [direction * (gap + _OVERLAP_MM) for direction in directions]
             moved = self.body.moved(state, sum(self.body.shifted_with(k, step[:3]) for k, step in enumerate(nearer)), nearer)
             assert moved is not None
-            state = self._increment_start(moved)
+            state = self._increment_start(moved, np.inf)
         raise InputError("The loaded object does not come to touch along its load; correct its pose or its load.")
 
-    def _described(self, state, counts, residual, work, dissipated, seconds):
+    def _described(self, state, counts, residual, work, dissipated, seconds, number):
         least, largest, low, high, share = np.inf, 0.0, np.inf, 0.0, np.nan
         for _, nodes, block in self.body.blocks:
             deformed = block.loops.deformation(state.displacement[nodes], block.at_rest)
@@ -210,13 +253,20 @@ class SolidPath:
             dissipated,
             work,
             seconds,
+            np.nan if self._times is None else float(self._times[number]),
         )
 
 
 def _still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
     """A step with the loads of the one before on the freedoms that it does not name."""
     kept = {} if before is None else {name: load for name, load in before.loads.items() if name not in step.ways}
-    return MotionStep(step.ways, kept | step.loads)
+    return MotionStep(step.ways, kept | step.loads, step.seconds)
+
+
+def times_of(steps: Sequence[SolidLoadStep]) -> np.ndarray | None:
+    """(steps,) ends in s; None where the steps have no durations."""
+    times = np.array([step.time_s for step in steps])
+    return times if np.isfinite(times).all() and len(times) else None
 
 
 def last(steps: Iterator[SolidLoadStep]) -> SolidLoadStep:

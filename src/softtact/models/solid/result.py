@@ -119,9 +119,9 @@ def nodal_fields(body: SolidBody, state: SolidState) -> tuple[np.ndarray, np.nda
     """
     n = len(body.mesh.points)
     sums, weights = np.zeros((2, n)), np.zeros(n)
-    for element, (_, nodes, block) in zip(_elements(body.mesh), body.blocks, strict=True):
+    for element, (_, nodes, block), memory in zip(_elements(body.mesh), body.blocks, state.memories, strict=True):
         deformed = block.loops.deformation(state.displacement[nodes], block.at_rest)
-        S = block.law.isochoric(deformed.C, tangent=False).stress[:, _VOIGT].reshape(deformed.F.shape)
+        S = block.isochoric(deformed.C, tangent=False, history=memory).stress[:, _VOIGT].reshape(deformed.F.shape)
         cauchy = np.einsum("egik,egkl,egjl->egij", deformed.F, S, deformed.F, optimize=True) / deformed.J[..., None, None]
         mean = np.trace(cauchy, axis1=2, axis2=3) / 3
         deviator = cauchy - mean[..., None, None] * np.eye(3)     # the stress of U(J) is hydrostatic: no part of it
