@@ -309,7 +309,7 @@ def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_pat
     for options, sentence in [
         (["--window", "uniaxial=2:1"], "'2:1' is not two rising numbers with a colon between them"),
         (["--window", "0.7:1.4"], "--window 0.7:1.4: write it as NAME=VALUE"),
-        (["--column", "force=F"], "`columns` maps 'force', which is no quantity with a unit"),
+        (["--column", "mass=F"], "`columns` maps 'mass', which is no quantity with a unit"),
         (["--choose", "yeoh", "--law", "gent"], "Law 'yeoh' is to be chosen but is not fitted"),
     ]:
         curve = neo_hooke_file(tmp_path / "uniaxial.csv", (0.8, 0.9, 1.1, 1.3))

@@ -77,6 +77,8 @@ def desk(tmp_path_factory):
     for name, shape in (("a", "tension"), ("b", "shear")):
         table = np.column_stack([100 * (stretch - 1), 350 * curves[shape]])
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="Strain [%],Stress", comments="")
+    table = np.column_stack([25 * (stretch - 1), 20 * 0.35 * curves["tension"]])
+    np.savetxt(folder / "forces.csv", table, delimiter=",", header="Extension [mm],Force [N]", comments="")
     rows = [f"{x:.4f};{350 * y:.3f}" for x, y in zip(stretch, curves["tension"], strict=True)]
     machine = ["Test 7", "Operator: X", "Streckung;Spannung", "-;kPa", *(row.replace(".", ",") for row in rows)]
     (folder / "machine.csv").write_text("\n".join([*machine, ""]))

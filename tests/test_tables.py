@@ -10,6 +10,9 @@ from softtact.tables import read_table
 HEADER = "stretch,nominal_stress_mpa\n"
 
 
+TWO_LINES = {"columns": {"stretch": "Stretch [-]", "nominal_stress_mpa": "Stress (nominal, of the section) [MPa]"}}
+
+
 @pytest.fixture
 def written(tmp_path):
     """Function: text or bytes -> path of a CSV file with them."""
@@ -78,6 +81,9 @@ def test_a_table_whose_columns_may_be_others_is_refused(written, content, option
     ('Machine; 7\nTest\n"stretch","nominal_stress_mpa"\n1.0,0.0\n# slower from here\n1.5,2.5E-1\n', {"skip_rows": 2}),
     (HEADER.replace("\n", ",Größe\n").encode("cp1252") + b"1.0,0.0,\xe4\n1.5,0.25,\n", {}),
     (HEADER + "1.0,\N{MINUS SIGN}0.0\n\n,\n1.5,0.25\n", {}),
+    ('"Stretch\n[-]";"Stress\r\n(nominal, of the section)\n[MPa]"\n1.0;0.0\n1.5;0.25\n', TWO_LINES),
+    ('Stretch [-],"Stress ""nominal""\n[MPa]"\n1.0,0.0\n1.5,0.25\n', {"columns": TWO_LINES["columns"] | {
+        "nominal_stress_mpa": 'Stress "nominal" [MPa]'}}),
 ])
 def test_the_dialects_of_other_programs_are_read(written, content, options):
     curve = read_curve(written(content), **options)
@@ -98,7 +104,7 @@ def test_a_row_of_units_below_the_header_is_taken_at_its_word(written, header, u
 
 @pytest.mark.parametrize(("header", "units", "sentence"), [
     ("stretch;nominal_stress", "mm;N", "row 2: 'mm' below 'stretch' is neither a number nor the unit that belongs there"),
-    ("stretch;nominal_stress", "-;N", "'N' below 'nominal_stress' .* MPa, kPa or Pa; .*lengths and forces are no strain"),
+    ("stretch;nominal_stress", "-;N", "'N' below 'nominal_stress' .* MPa, kPa, .* or kgf/mm2; .*lengths and forces are no strain"),
     ("stretch;nominal_stress", "-;mPa", "'mPa' below 'nominal_stress'"),
     ("stretch;nominal_stress_mpa", "-;kPa", "'kPa' below 'nominal_stress_mpa' .* mpa, as its name says"),
     ("engineering_strain_percent;nominal_stress_mpa", "-;MPa", "'-' below 'engineering_strain_percent' .* %, as its name says"),
@@ -136,6 +142,67 @@ def test_a_workbook_that_may_be_read_wrong_is_refused(workbook, sheets, options,
     path = workbook(sheets, change=options.pop("change", lambda book: None))
     with pytest.raises(InputError, match=sentence):
         read_curve(path, **options)
+
+
+def test_names_on_two_lines_are_read_from_a_workbook_too(workbook):
+    path = workbook({"a": [["Stretch\n[-]", "Stress\n(nominal, of the section)\n[MPa]"], *ROWS[1:]]})
+    assert read_curve(path, **TWO_LINES).stretch.tolist() == [1.0, 1.5]
+
+
+@pytest.mark.parametrize("minus", "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d")
+def test_every_sign_of_a_minus_is_read_in_the_first_row_and_in_exponents(written, minus):
+    content = "engineering_strain;nominal_stress_mpa\n-0,25;-1,5E-1\n-0,5;-4E-1\n".replace("-", minus)
+    curve = read_curve(written(content), decimal=",")
+    assert curve.stretch.tolist() == [0.75, 0.5] and curve.nominal_stress.tolist() == [-0.15, -0.4]
+
+
+def test_a_dash_between_numbers_is_no_minus(written):
+    with pytest.raises(InputError, match="row 2: '1–2' is not a number"):
+        read_curve(written(HEADER + "1–2,0\n1.5,0.25\n"))
+
+
+FORMULAS = [["stretch", "nominal_stress_mpa", "note"], [1, "=0.35*(A2-A2^-2)", "=B2"], [1.5, "=0.35*(A3-A3^-2)", None]]
+
+
+def test_a_formula_without_a_stored_value_is_refused_by_its_text_and_only_where_it_is_needed(workbook):
+    path = workbook({"a": FORMULAS})
+    with pytest.raises(InputError, match=r"row 2: '=0.35\*\(A2-A2\^-2\)' is not a number; it is a formula without a stored"):
+        read_curve(path)
+    assert read_curve(workbook({"a": [*ROWS[:1], [1, 0, "=B2"], [1.5, 0.25, "=B3"]]})).stretch.tolist() == [1.0, 1.5]
+
+
+def hide_rows(book):
+    for row in (4, 5, 7):
+        book["a"].row_dimensions[row].hidden = True
+
+
+def hide_columns(book):
+    book["a"].column_dimensions.group("C", "D", hidden=True)
+
+
+def test_hidden_rows_are_left_out_with_a_remark(workbook):
+    rows = [*ROWS, [1.55, 9], [1.6, 9], [1.7, 0.3], [1.8, 9]]
+    curve = read_curve(workbook({"a": rows}, change=hide_rows))
+    assert curve.stretch.tolist() == [1.0, 1.5, 1.7]
+    assert "rows 4 to 5, 7 of the sheet 'a' are hidden and left out; show them in Excel" in curve.remarks[0]
+
+
+def test_hidden_columns_are_left_out_with_a_remark(workbook):
+    rows = [[*row, *row] for row in ROWS]
+    curve = read_curve(workbook({"a": rows}, change=hide_columns))
+    assert "columns C to D of the sheet 'a' are hidden and left out" in curve.remarks[0]
+    with pytest.raises(InputError, match="no column holds the stress among x, stretch .columns C to D of the sheet 'a' are hidden"):
+        read_curve(workbook({"a": [["x", "stretch", "nominal_stress_mpa", "y"], [1, 1, 0, 1], [1, 2, 1, 1]]}, change=hide_columns))
+
+
+def hide_sheet(book):
+    book["b"].sheet_state = "hidden"
+
+
+def test_a_hidden_sheet_is_not_read_unless_it_is_named(workbook):
+    sheets = {"a": ROWS, "b": [*ROWS[:2], [2, 0.6]]}
+    assert read_curve(workbook(sheets, change=hide_sheet)).stretch.tolist() == [1.0, 1.5]
+    assert read_curve(workbook(sheets, change=hide_sheet), sheet="b").stretch.tolist() == [1.0, 2.0]
 
 
 def test_a_file_that_is_no_workbook_is_refused(written):

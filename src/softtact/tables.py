@@ -12,26 +12,26 @@ import codecs
 import csv
 import math
 import re
-import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
 from softtact.errors import InputError
-from softtact.inputs import check_input, check_limit, in_one_sentence
+from softtact.inputs import check_input
+from softtact.workbooks import WORKBOOKS, Cell, read_sheet
 
 SEPARATORS = "\t;,"
 DECIMALS = (".", ",")
 _SEP_LINE = re.compile(r'"?sep=(\\t|[^\w\s".]|\t)"?\s*', flags=re.IGNORECASE)      # a first line for Excel
+# What programs and fonts write for a minus: hyphens, dashes, the mathematical sign, a small and a wide one.
+_MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212\u02d7\ufe58\ufe63\uff0d", "-"))
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", flags=re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", flags=re.IGNORECASE)
 _NOT_CP1252 = set(b"\0\x81\x8d\x8f\x90\x9d")     # bytes without a character in cp1252
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _STATE = "state the decimal comma (--decimal ,)"
 _ROWS_TO_COMPARE = 5    # fewest rows from which the usual length of a number is known
-WORKBOOKS = (".xlsx", ".xlsm")
-Cell = str | float
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class Table:
 
     header: the columns' names;  rows: [(row number in the file from 1, cells)]; cells are text, in Excel also numbers
     notes: lines that begin with `#`;  decimal: `.` or `,`, or None: a point, and the caller has no option to change it
+    remarks: sentences without a full stop on what was left out, such as hidden rows
     """
 
     path: Path
@@ -47,6 +48,7 @@ class Table:
     rows: list[tuple[int, list[Cell]]]
     notes: list[str]
     decimal: str | None = None
+    remarks: tuple[str, ...] = ()
 
     def positions(self, name: str) -> list[int]:
         """Positions of the columns of this name, also with the suffixes that programs add to a duplicate name."""
@@ -80,8 +82,9 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
     if decimal not in (None, *DECIMALS):
         raise InputError(f"{path}: the decimal sign is {decimal!r}; state '.' or ','.")
     if path.suffix.lower() in WORKBOOKS:
-        records = [(row, cells) for row, cells in read_sheet(path, sheet=sheet) if row > skip_rows]
-        return _of_sheet(path, records, what=what, marker=marker, layout=layout, decimal=decimal)
+        records, remarks = read_sheet(path, sheet=sheet)
+        records = [(row, cells) for row, cells in records if row > skip_rows]
+        return replace(_of_sheet(path, records, what=what, marker=marker, layout=layout, decimal=decimal), remarks=remarks)
     if sheet is not None:
         raise InputError(f"{path}: it has no sheet {sheet!r}, for it is no workbook of Excel; leave `sheet` out.")
     text = read_text(path, what=what)
@@ -91,9 +94,9 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
     if not lines:
         raise InputError(f"{path}: the file is empty{f' below row {skip_rows}' * bool(skip_rows)}; give a {what} with its columns.")
     first = _header_at(path, [line for _, line in lines], marker, layout)
-    separator = separator or _separator(lines[first][1])
+    separator = separator or _separator([line for _, line in lines[first:]])
     (_, header), *rows = _records(path, lines[first:], separator)
-    table = Table(path, [name.strip() for name in header], rows, notes, decimal)
+    table = Table(path, [_on_one_line(name) for name in header], rows, notes, decimal)
     return _whole(table, text, _NAMES.get(separator, repr(separator)))
 
 
@@ -113,7 +116,7 @@ def read_matrix(path: str | Path, *, what: str = "table") -> list[list[float]]:
     _, lines = _parted(lines)
     if not lines:
         raise InputError(f"{path}: the file is empty; give a {what}.")
-    separator = separator or _separator(lines[0][1])
+    separator = separator or _separator([line for _, line in lines])
     rows = _records(path, lines, separator)
     table = Table(path, [f"column {k}" for k in range(len(rows[0][1]))], rows, [])
     table = _whole(table, text, _NAMES.get(separator, repr(separator)))
@@ -154,12 +157,17 @@ def encoding_of(path: str | Path) -> str:
     return "utf-8-sig"
 
 
+def ascii_minus(text: str) -> str:
+    """The text without blanks at its ends, with `-` for the other signs of a minus: of a number, not within a sentence."""
+    return text.strip().translate(_MINUS)
+
+
 def number(path: Path, row: int, cell: Cell, *, decimal: str | None = None) -> float:
     """The finite number in a cell. Raises InputError, with the row and a remedy, for other content."""
     if isinstance(cell, float):
         value, text = cell, f"{cell:g}"
     else:
-        text = cell.strip().replace("\N{MINUS SIGN}", "-")
+        text = ascii_minus(cell)
         if _NOT_FINITE.fullmatch(text):
             value = math.nan
         elif not is_number(cell, decimal=decimal):
@@ -175,13 +183,15 @@ def is_number(cell: Cell, *, decimal: str | None = None) -> bool:
     """Whether a cell holds a number and nothing else."""
     if isinstance(cell, float):
         return True
-    text = cell.strip().replace("\N{MINUS SIGN}", "-")
+    text = ascii_minus(cell)
     if decimal == ",":
         text = text.replace(".", "?").replace(",", ".")
     return _NUMBER.fullmatch(text) is not None
 
 
 def _remedy(text, decimal):
+    if text.startswith("="):
+        return "it is a formula without a stored value: open the file in Excel or LibreOffice and save it again"
     if decimal != "," and "," in text:
         return "write it with a decimal point and no separator of thousands" + f", or {_STATE}" * (decimal is not None)
     if decimal == "," and "." in text:
@@ -226,9 +236,13 @@ def _header_at(path, lines, marker, layout):
     raise InputError(f"{path}: no header with {marker!r} was found; is its layout {layout}?")
 
 
-def _separator(header):
-    """The first of tab, semicolon and comma in the header outside quotes; in the rows a comma may be a decimal sign."""
-    bare = re.sub(r'"[^"]*"', "", header.strip())
+def _separator(lines):
+    """The first of tab, semicolon and comma in the header outside quotes; in the rows a comma may be a decimal sign.
+
+    lines: the header's and all below; a quoted name may go over several
+    """
+    end = next((k for k in range(1, len(lines)) if "".join(lines[:k]).count('"') % 2 == 0), len(lines))
+    bare = re.sub(r'"[^"]*"', "", "\n".join(lines[:end]).strip())
     return next((separator for separator in SEPARATORS if separator in bare), ",")
 
 
@@ -239,7 +253,7 @@ def _records(path, lines, separator):
     def fed():
         for row, line in lines:
             started.append(row)
-            yield line
+            yield f"{line}\n"
 
     reader, records, taken = csv.reader(fed(), delimiter=separator, skipinitialspace=True, strict=True), [], 0
     try:
@@ -309,49 +323,9 @@ def _of_sheet(path, records, *, what, marker, layout, decimal):
         raise InputError(f"{path}: the sheet is empty; give a {what} with its columns.")
     first = _header_at(path, ["\t".join(map(str, cells)) for _, cells in records], marker, layout)
     (_, header), *rows = records[first:]
-    return Table(path, [str(name).strip() for name in header], rows, notes, decimal)
+    return Table(path, [_on_one_line(str(name)) for name in header], rows, notes, decimal)
 
 
-def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int, list[Cell]]]:
-    """[(row number from 1, cells)] of a sheet: numbers as float, all else as text, "" for an empty cell.
-
-    sheet: its name; by default the only sheet that is not empty
-    Raises InputError with the file and the remedy.
-    """
-    import openpyxl  # of an extra: where it is missing, the command says which
-
-    check_input(path, "workbook", missing="there is no such file; give the path of a workbook.")
-    with in_one_sentence(path, "not a readable workbook", "save it again as .xlsx, or as CSV"):
-        with zipfile.ZipFile(path) as parts:
-            check_limit(path, "workbook", sum(one.file_size for one in parts.infolist()))
-        book = openpyxl.load_workbook(path, data_only=True)
-        sheets = {page.title: page for page in book.worksheets}
-        check_limit(path, "cells", max((page.max_row * page.max_column for page in sheets.values()), default=0))
-    page = sheets[_chosen(path, sheets, sheet)]
-    return [(row, [_cell(path, cell) for cell in cells]) for row, cells in enumerate(page.iter_rows(), 1)]
-
-
-def _chosen(path, sheets, sheet):
-    """The name of the sheet to read."""
-    if sheet is not None:
-        if sheet not in sheets:
-            raise InputError(f"{path}: there is no sheet {sheet!r}; name one of {', '.join(sheets)}.")
-        return sheet
-    filled = [name for name, page in sheets.items() if any(value is not None for row in page.values for value in row)]
-    if len(filled) != 1:
-        found = f"several sheets hold data, {', '.join(filled)}" if filled else "all sheets are empty"
-        raise InputError(f"{path}: {found}; name the one to read (--sheet NAME).")
-    return filled[0]
-
-
-def _cell(path, cell):
-    """A cell's content. Raises InputError for a number shown as percent: Excel displays a hundred times the stored value."""
-    value = cell.value
-    if value is None:
-        return ""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        if "%" in (cell.number_format or ""):
-            raise InputError(f"{path}, cell {cell.coordinate}: it is shown as percent, so it holds {value:g} for what looks like "
-                             f"{100 * value:g}; format the column as numbers, and let its header say whether they are percent.")
-        return float(value)
-    return str(value)
+def _on_one_line(name):
+    """The name of a column, with a blank for a line break within it."""
+    return re.sub(r"\s*[\r\n]\s*", " ", name.strip())

@@ -219,8 +219,8 @@ def test_a_curve_that_no_rubber_gives_is_refused(write_file):
 
 
 def test_a_mapped_name_that_is_no_quantity_is_refused(write_file):
-    with pytest.raises(InputError, match="`columns` maps 'force', which is no quantity with a unit"):
-        read_curve(write_file("F,e\n1,0\n"), columns={"force": "F"})
+    with pytest.raises(InputError, match="`columns` maps 'mass', which is no quantity with a unit"):
+        read_curve(write_file("F,e\n1,0\n"), columns={"mass": "F"})
 
 
 def test_curves_in_different_units_are_refused_with_both_names(write_file):

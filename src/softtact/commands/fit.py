@@ -36,7 +36,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--nonnegative", action="store_true", default=None, help="keep constants in MPa from being negative")
     command.add_argument("--small-strain", type=float, metavar="E", help="strain up to which E is the slope (default: 0.1)")
     reading = command.add_argument_group("how the files are read")
-    reading.add_argument("--mode", choices=("uniaxial", "equibiaxial", "planar", "volumetric"),
+    reading.add_argument("--mode", choices=("uniaxial", "equibiaxial", "planar", "simple_shear", "volumetric"),
                          help="test mode of all the files (default: as each file or its name says)")
     reading.add_argument("--layout", choices=LAYOUTS, default="plain",
                          help="how the files are laid out (default: plain, columns named in a header; literature: a folder)")
@@ -45,6 +45,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     reading.add_argument("--decimal", choices=(".", ","), default=".", help="decimal sign (default: the point)")
     reading.add_argument("--skip-rows", type=int, default=0, metavar="N", help="pass over N lines above the header")
     reading.add_argument("--sheet", metavar="NAME", help="sheet of an Excel workbook (.xlsx) that has several")
+    reading.add_argument("--area-mm2", type=float, metavar="A", help="undeformed section, for a column of force")
+    reading.add_argument("--length-mm", type=float, metavar="L", help="undeformed length, for a column of extension")
+    reading.add_argument("--holds", choices=("instantaneous", "relaxed"), help="stress to take where steps relax")
     reading.add_argument("--sort", action="store_true", help="order the rows by stretch")
     reading.add_argument("--compression", action="store_true", help="a compression test written without a minus")
     command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw data, fits, residuals and stable ranges")
@@ -63,7 +66,7 @@ def _fit(options):
     if config is not None:
         curves, settings = curves_of(config.curve_settings), config.fit_settings
     else:
-        curves, settings = read_curves(options.curves, **_reading(options)), {}
+        curves, settings = read_curves(options.curves, window=_windows(options), **_reading(options)), {}
     _refuse_idle(options, curves, settings)
     card = make_card(curves, **settings | _fit_settings(options))
     write_card(options.out, card)
@@ -100,7 +103,7 @@ def _inputs(options, config):
 
 
 _READING: dict[str, Any] = {"mode": None, "layout": "plain", "columns": {}, "sort": False, "compression": False, "decimal": ".",
-                            "skip_rows": 0, "sheet": None}
+                            "skip_rows": 0, "sheet": None, "area_mm2": None, "length_mm": None, "holds": None}
 
 
 def _reading(options):
@@ -125,9 +128,14 @@ def _fit_settings(options):
     stated = {name: getattr(options, name) for name in ("choose", "material", "poisson", "bulk_over_shear", "residual",
                                                         "nonnegative", "small_strain")}
     stated["laws"] = options.law if options.law in (None, "all") else options.law.split(",")
-    stated["window"] = {mode: numbers("--window", text, 2) for mode, text in pairs("--window", options.window)} or None
+    stated["window"] = _windows(options) or None
     stated["weights"] = {mode: numbers("--weight", text, 1)[0] for mode, text in pairs("--weight", options.weight)} or None
     return {name: value for name, value in stated.items() if value is not None}
+
+
+def _windows(options):
+    """{mode: [from, to]} of --window."""
+    return {mode: numbers("--window", text, 2) for mode, text in pairs("--window", options.window)}
 
 
 def _fit_lines(card):

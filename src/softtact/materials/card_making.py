@@ -18,16 +18,16 @@ from softtact.materials.checks import refuse_mixed_units
 from softtact.materials.consistency import SCAN, against_linear, covers, printed_warnings, stable_ranges
 from softtact.materials.curves import (
     VOLUMETRIC,
-    Curve,
-    VolumetricCurve,
+    AnyCurve,
     common_kind,
     join_by_mode,
+    path_of,
     path_window,
     principal_window,
     refuse_idle,
 )
 from softtact.materials.fitting import STARTS, FitOptions, errors_of, fit_law, law_names
-from softtact.materials.laws.base import TEST_PATHS, Law
+from softtact.materials.laws.base import SIMPLE_SHEAR, TEST_PATHS, Law
 from softtact.materials.linear import LinearConstants, bulk_modulus, poisson_ratio, small_strain_constants, young_modulus
 from softtact.progress import progress
 
@@ -84,11 +84,11 @@ class CardOptions:
         return {name: getattr(self, name) for name in FitOptions.__dataclass_fields__}
 
 
-def make_card(curves: Sequence[Curve | VolumetricCurve], *, material: str = "material", printed: dict[str, Any] | None = None,
+def make_card(curves: Sequence[AnyCurve], *, material: str = "material", printed: dict[str, Any] | None = None,
               **options: Any) -> dict[str, Any]:
     """Fit the laws to the curves and return the card as a dict, ready for `write_json`.
 
-    curves: list of `Curve` and `VolumetricCurve`;  options: those of `CardOptions`
+    curves: of the tests;  options: those of `CardOptions`
     printed: constants published for the material, {law: {"parameters": {...}}}, checked against each other
     """
     settings = CardOptions(**options)
@@ -99,7 +99,7 @@ def make_card(curves: Sequence[Curve | VolumetricCurve], *, material: str = "mat
     volumetric: Any = next((curve for curve in curves if curve.mode == VOLUMETRIC), None)
     bulk = bulk_modulus(volumetric, bulk_over_shear=settings.bulk_over_shear)
     if not shape:
-        raise InputError("There is only a volumetric curve; give a uniaxial, equibiaxial or planar one for the shape.")
+        raise InputError("There is only a volumetric curve; give a uniaxial, equibiaxial, planar or simple_shear one for shape.")
     fits, entries = {}, {}
     for name in progress(law_names(settings.laws), label="laws"):
         fits[name] = fit_law(name, shape, **settings.fit)
@@ -142,7 +142,7 @@ def _windowed(curves, window):
     """The curves cut to the windows of their modes."""
     kept = [curve.within(window[curve.mode]) if curve.mode in window else curve for curve in curves]
     for curve in kept:
-        if len(next(iter(curve.columns.values()))) < 2:
+        if len(curve.stress) < 2:
             raise InputError(f"The window {window[curve.mode]} leaves no {curve.mode} curve; widen it.")
     return kept
 
@@ -164,7 +164,7 @@ def _stable_names(ranking, entries):
 
 
 def _curve_entry(curve):
-    points = len(next(iter(curve.columns.values())))
+    points = len(curve.stress)
     return {"mode": curve.mode, "kind": curve.kind, "source": curve.source, "points": points}
 
 
@@ -173,8 +173,8 @@ def _law_entry(fit, curves, bulk, options):
     law = fit.make()
     modulus = bulk.of(law.mu0)
     low, high = SCAN
-    windows = [curve.window for curve in curves]
-    stable = stable_ranges(law, scan=(min(low, *(w[0] for w in windows)), max(high, *(w[1] for w in windows))))
+    paths = [path_of(curve.mode, curve.window) for curve in curves]
+    stable = stable_ranges(law, scan=(min(low, *(w[0] for _, w in paths)), max(high, *(w[1] for _, w in paths))))
     return {
         "parameters": fit.parameters,
         "parameter_names": list(fit.parameters),
@@ -195,7 +195,7 @@ def _law_entry(fit, curves, bulk, options):
         "d_source": bulk.source,
         "small_strain": small_strain_constants(law.mu0, modulus),
         "stable_range": stable,
-        "stable_over_data": law.mu0 > 0 and all(covers(stable[curve.mode], curve.window) for curve in curves),
+        "stable_over_data": law.mu0 > 0 and all(covers(stable[mode], window) for mode, window in paths),
         "fit": fit.record,
     }
 
@@ -274,8 +274,9 @@ def _consistency_warnings(card, threshold):
 
 
 def paths_inside(windows: Mapping[str, tuple[float, float]]) -> dict[str, np.ndarray]:
-    """{mode: stretches (n,)} over the windows {mode: (min, max)} of the tests."""
-    return {mode: np.geomspace(*window, _POINTS) for mode, window in windows.items() if mode in TEST_PATHS}
+    """{mode: stretches or shear strains (n,)} over the windows {mode: (min, max)} of the tests."""
+    paths = {mode: np.geomspace(*window, _POINTS) for mode, window in windows.items() if mode in TEST_PATHS}
+    return paths | {mode: np.linspace(*window, _POINTS) for mode, window in windows.items() if mode == SIMPLE_SHEAR}
 
 
 def paths_outside(principal: tuple[float, float]) -> dict[str, np.ndarray]:
@@ -325,7 +326,7 @@ def _share(entry):
     return "any amount" if entry["difference"] is None else f"{entry['difference']:.0%}"
 
 
-def predict_left_out(name: str, curves: Sequence[Curve], **options: Any) -> dict[str, dict[str, float] | None]:
+def predict_left_out(name: str, curves: Sequence[AnyCurve], **options: Any) -> dict[str, dict[str, float] | None]:
     """{mode: {"rmse_mpa", "relative_error"}} of the law fitted to all curves but that mode's; {} with fewer than two.
 
     options: those of `FitOptions`. None for a law that has too few points in the other curves, or that does not exist

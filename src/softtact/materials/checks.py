@@ -16,11 +16,13 @@ import numpy as np
 from scipy.optimize import nnls
 
 from softtact.errors import InputError
-from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve
-from softtact.materials.laws.base import principal_stretches
+from softtact.materials.curves import VOLUMETRIC, AnyCurve
+from softtact.materials.laws.base import SIMPLE_SHEAR, principal_stretches, rest_of, work_divisor
 
 # No elastomer exceeds these; larger values are percent or in another unit.
 LARGEST_STRETCH = 25.0
+LARGEST_SHEAR = 10.0
+DEFORMATION = {VOLUMETRIC: "volume ratio", SIMPLE_SHEAR: "shear strain"}     # of the other modes: stretch
 LARGEST_STRESS_MPA = 200.0
 LARGEST_PRESSURE_MPA = 2000.0
 # Stress may have the wrong sign by this share of the largest one (zero drift of a load cell) before it is refused.
@@ -39,28 +41,64 @@ _NEAR_ZERO = 0.005              # largest strain of a row that counts as unstrai
 _START = 0.2                    # strain up to which a curve is proportional to the neo-Hookean law's
 _PRELOAD = (0.05, 0.3)          # of the stress at `_START`: with an unstrained row, and with an extrapolated line
 _SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of these against that over the last two
+# Of the greatest stress before, of the greatest of all, and of the noise: a larger fall of the stress is a break.
+_BREAK = (0.1, 0.03, 6.0)
 _SLACK = 0.5                    # their ratio; in twelve published curves it is 0.7 and more
 
 
 def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray,
-            compression: bool) -> tuple[str, ...]:
+            compression: bool, window: Sequence[float] | None = None) -> tuple[str, ...]:
     """Remarks (a tuple of sentences) on a curve; impossible data are refused.
 
     rows: (n,) numbers of the file's rows;  x, y: (n,) stretch and nominal stress, or volume ratio and pressure, in MPa
     raw: (2, n) the same two columns as in the file;  compression: whether the test is stated to be written without a minus
+    window: [min, max] of x that will be used, for remarks are on these rows
     """
     _check_magnitude(path, rows, x, y, mode, raw)
     _check_sign(path, rows, x, y, mode, raw, compression)
-    _check_units_within(path, rows, x, y)
-    if mode == VOLUMETRIC:
-        return tuple(f"{path}: {remark}" for remark in _of_volume(x))
-    return tuple(f"{path}: {remark}" for remark in remarks(x, y, mode=mode, compression=compression))
+    _check_units_within(path, rows, x, y, mode)
+    if window is not None:
+        inside = (x >= window[0]) & (x <= window[1])
+        if inside.sum() > 2:
+            rows, x, y = rows[inside], x[inside], y[inside]
+    found = _of_volume(x) if mode == VOLUMETRIC else remarks(x, y, mode=mode, compression=compression)
+    return tuple(f"{path}: {remark}" for remark in (*found, *_break(rows, x, y, mode)))
 
 
-def refuse_mixed_units(curves: Sequence[Curve | VolumetricCurve]) -> None:
+def _break(rows, x, y, mode):
+    """The remark on a stress that falls while the strain grows, in a tuple that is empty otherwise."""
+    strain = x - rest_of(mode)
+    for side in (strain >= 0, strain <= 0):
+        at = np.flatnonzero(side)[np.argsort(np.abs(strain[side]), kind="stable")]
+        stress = np.abs(y[at])
+        if len(at) < 3 or not strain[at].any():
+            continue
+        greatest = np.maximum.accumulate(stress)
+        scale = np.maximum(stress, _BREAK[0] * stress.max())
+        fallen = greatest - stress > np.maximum(np.maximum(_BREAK[0], _BREAK[2] * normal_noise(stress, scale)) * greatest,
+                                                _BREAK[1] * stress.max())
+        if fallen.any():
+            first = int(np.argmax(fallen))
+            peak = int(np.argmax(stress[:first]))
+            least, ends = stress[peak:].min(), sorted((float(x[at[0]]), float(x[at[peak]])))
+            return (f"from row {rows[at[peak + 1]]} on its stress falls, by {1 - least / stress[peak]:.0%} in all, while the "
+                    "strain grows, as where a specimen tears or slips in its clamps; leave these rows out, or state the window "
+                    f"before them (--window {mode}={ends[0]:.6g}:{ends[1]:.6g})",)
+    return ()
+
+
+def normal_noise(values: np.ndarray, scale: np.ndarray | float = 1.0) -> float:
+    """Standard deviation of the noise of a smooth curve (n,), over its scale (n,): by the first quartile of second differences.
+
+    Jumps and bends, which are in fewer rows, do not count. 0 for fewer than three values.
+    """
+    second = np.abs(np.diff(values, 2)) / np.broadcast_to(scale, np.shape(values))[1:-1]
+    return float(np.quantile(second, 0.25)) / (np.sqrt(6) * 0.3186) if len(second) else 0.0
+
+
+def refuse_mixed_units(curves: Sequence[AnyCurve]) -> None:
     """Refuse curves of one material whose stiffnesses are so far apart that one must be in another unit."""
-    moduli = [(secant_modulus(curve.mode, curve.stretch, curve.nominal_stress), curve) for curve in curves
-              if isinstance(curve, Curve)]
+    moduli = [(secant_modulus(curve.mode, curve.deformation, curve.stress), curve) for curve in curves if curve.mode != VOLUMETRIC]
     moduli = [(modulus, curve) for modulus, curve in moduli if modulus > 0]
     if len(moduli) < 2:
         return
@@ -88,7 +126,12 @@ def _swapped(raw, mode):
 
 
 def _check_magnitude(path, rows, x, y, mode, raw):
-    name = "volume ratio" if mode == VOLUMETRIC else "stretch"
+    if mode == SIMPLE_SHEAR:
+        refuse_first(path, rows, x, np.abs(x) > LARGEST_SHEAR,
+                     f"the shear strain {{value}} is beyond {LARGEST_SHEAR:g}, which no elastomer bears; if the column holds "
+                     "percent, name it shear_strain_percent.")
+        x = 1 + np.abs(x)
+    name = DEFORMATION.get(mode, "stretch")
     refuse_first(
         path, rows, x, x <= 0,
         f"the {name} {{value}} is not positive; if the column holds strain, name it engineering_strain, true_strain"
@@ -113,7 +156,7 @@ def _check_magnitude(path, rows, x, y, mode, raw):
 
 
 def _check_sign(path, rows, x, y, mode, raw, compression):
-    wrong = y * np.sign(x - 1) * (-1 if mode == VOLUMETRIC else 1) < -SIGN_TOLERANCE * np.abs(y).max()
+    wrong = y * np.sign(x - rest_of(mode)) * (-1 if mode == VOLUMETRIC else 1) < -SIGN_TOLERANCE * np.abs(y).max()
     if mode == VOLUMETRIC:
         refuse_first(path, rows, y, wrong, "the pressure {value} MPa has the wrong sign for its volume ratio;"
                                             " a pressure that compresses is positive, with a volume ratio below 1.")
@@ -126,9 +169,9 @@ def _check_sign(path, rows, x, y, mode, raw, compression):
     )  # fmt: skip
 
 
-def _check_units_within(path, rows, x, y):
+def _check_units_within(path, rows, x, y, mode):
     """A stress that changes by a factor of about 1000 from one row to the next, and stays so, has changed its unit."""
-    strain = np.abs(x - 1)
+    strain = np.abs(x - rest_of(mode))
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = np.abs(y[1:] / y[:-1]) / (strain[1:] / strain[:-1])
         growth = np.maximum(growth, 1 / growth)
@@ -149,6 +192,11 @@ def _of_volume(ratio):
 
 def remarks(stretch: np.ndarray, stress: np.ndarray, *, mode: str, compression: bool) -> Iterator[str]:
     """Sentences on a curve of shape: stretch (n,), nominal stress (n,) in MPa; `compression`: stated to be without a minus."""
+    if mode == SIMPLE_SHEAR:
+        found = [_modulus(stretch, stress, mode) or _tension_as_shear(stretch, stress) or _preload(stretch, stress, mode)
+                 or _slack(stretch, stress, mode)]
+        yield from (remark for remark in found if remark)
+        return
     unit = _unit_of_strain(stretch, stress, mode) or _modulus(stretch, stress, mode)
     found = [unit, _positive_compression(stretch, stress, mode), _negative_tension(stretch, stress, mode) if compression else None]
     if not any(found):      # for a curve in another unit or of another sign the checks of zero are meaningless
@@ -164,8 +212,8 @@ def secant_modulus(mode: str, stretch: np.ndarray, stress: np.ndarray) -> float:
 
 def _neo_hooke(mode, stretch):
     """Nominal stress (n,) over the shear modulus."""
-    square = principal_stretches(mode, stretch) ** 2
-    return (square[:, 0] - square[:, 2]) / stretch
+    stretches = principal_stretches(mode, stretch)
+    return (stretches[:, 0] ** 2 - stretches[:, 2] ** 2) / work_divisor(mode, stretches)
 
 
 def _unit_of_strain(stretch, stress, mode):
@@ -175,6 +223,8 @@ def _unit_of_strain(stretch, stress, mode):
     as_percent = largest > 0.5 and any(_better(stretch, stress, other, mode) or _all_but_noise(stretch, stress, other, mode)
                                        for other in percent)
     coarse = stretch.max() > 3 and strain[strain > 1e-9].min() >= 0.5 and np.median(np.abs(np.diff(stretch))) >= 0.3
+    if mode == "planar" and (shear := _shear_as_tension(stretch, stress, as_percent)):
+        return shear
     if as_percent or coarse:
         return (f"the stretch goes to {stretch.max():.3g}, and the curve is that of a strain in percent; if the column holds "
                 "percent, name it engineering_strain_percent")
@@ -183,6 +233,31 @@ def _unit_of_strain(stretch, stress, mode):
     if as_ratio or largest < 0.02:
         return (f"the largest strain is {largest:.2%}{', and the curve is that of a larger one' if as_ratio else ''}; if the "
                 "column holds a ratio and not percent, name it engineering_strain")
+    return None
+
+
+def _shear_as_tension(stretch, stress, as_percent):
+    """Remark on a planar curve that is a straight line, as of neo-Hooke in simple shear, the strain taken for gamma.
+
+    `as_percent`: whether it may also be a curve in percent, nearly as straight; one that is much closer is the right one.
+    """
+    gamma = stretch - 1
+    line, percent = (_misfit(unit, stress) for unit in (gamma, _neo_hooke("planar", 1 + gamma / 100)))
+    largest, tension = np.abs(gamma).max(), _misfit(_neo_hooke("planar", stretch), stress)
+    possible = 0.5 < largest <= LARGEST_SHEAR and _as_stiff_as_rubber(SIMPLE_SHEAR, gamma, stress)
+    if not possible or line >= _MUCH_BETTER * tension or as_percent and percent < _MUCH_BETTER * line:
+        return None
+    either = as_percent and line > _MUCH_BETTER * percent
+    return (f"the stress is a straight line in strain up to {largest:.3g}, as in simple shear, which is another test; if it is "
+            f"one, give it as {SIMPLE_SHEAR}{'; if the column holds percent, name it engineering_strain_percent' * either}")
+
+
+def _tension_as_shear(gamma, stress):
+    """Remark on a curve of simple shear that bends as planar tension does."""
+    if gamma.min() < -0.3 or np.abs(gamma).max() < 0.5:
+        return None
+    if _misfit(_neo_hooke("planar", 1 + gamma), stress) < _MUCH_BETTER * _misfit(gamma, stress):
+        return "it bends as a curve of planar tension does; if it is one, give it as planar"
     return None
 
 
@@ -225,7 +300,7 @@ def _left(columns, stress):
 
 
 def _modulus(stretch, stress, mode):
-    start = np.abs(stretch - 1) <= 0.5
+    start = np.abs(stretch - rest_of(mode)) <= 0.5
     used = start if start.sum() >= 3 else np.full(len(stretch), True)
     modulus = secant_modulus(mode, stretch[used], stress[used])
     if 0 < modulus < _MODULI_MPA[0] or modulus > _MODULI_MPA[1]:
@@ -258,16 +333,16 @@ def _negative_tension(stretch, stress, mode):
 
 def _preload(stretch, stress, mode):
     """Remark on stress without strain: of unstrained rows, else by extrapolation of the straight line of the first strains."""
-    strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
+    strain, unit = np.abs(stretch - rest_of(mode)), _neo_hooke(mode, stretch)
     start, none = strain <= _START, strain <= _NEAR_ZERO
     if start.sum() < 3 or strain.min() > 0.05:
         return None
     slope, at_zero = np.polyfit(unit[start], stress[start], 1)
-    scale = max(slope, secant_modulus(mode, stretch, stress)) * np.abs(_neo_hooke(mode, np.array([1 + _START]))[0])
+    scale = max(slope, secant_modulus(mode, stretch, stress)) * np.abs(_neo_hooke(mode, np.array([rest_of(mode) + _START]))[0])
     noise = np.sqrt(np.mean((stress[start] - at_zero - slope * unit[start]) ** 2))
     if none.any():
         at_zero = float(np.mean(stress[none] - slope * unit[none]))
-    offset = abs(at_zero) if none.any() else at_zero * _loading(stretch)
+    offset = abs(at_zero) if none.any() else at_zero * _loading(stretch, mode)
     if offset > max(_PRELOAD[0 if none.any() else 1] * scale, 3 * noise) > 0:
         return (f"it has a stress of {at_zero:.3g} MPa at no strain, as a preload or an offset of the load cell gives; take it off "
                 "the column")
@@ -276,7 +351,7 @@ def _preload(stretch, stress, mode):
 
 def _slack(stretch, stress, mode):
     """Remark on strain without stress: a modulus over the first strains far below that over the next ones."""
-    strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
+    strain, unit = np.abs(stretch - rest_of(mode)), _neo_hooke(mode, stretch)
     if strain.min() > _SLACK_STRAINS[0]:
         return None
     scale = min(strain.max() / _SLACK_STRAINS[-1], 1.0)
@@ -306,9 +381,9 @@ def _modulus_between(strain, stress, unit, low, high):
     return float(unit[used] @ stress[used] / (unit[used] @ unit[used])) if used.any() else None
 
 
-def _loading(stretch):
+def _loading(stretch, mode):
     """+1 in tension, -1 in compression, by the larger strain."""
-    return 1.0 if stretch.max() - 1 >= 1 - stretch.min() else -1.0
+    return 1.0 if stretch.max() - rest_of(mode) >= rest_of(mode) - stretch.min() else -1.0
 
 
 def _misfit(unit, stress):

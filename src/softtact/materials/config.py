@@ -15,22 +15,29 @@ from pydantic import Field
 from softtact.errors import InputError
 from softtact.files import read_yaml
 from softtact.materials.curves import refuse_idle
-from softtact.materials.laws.base import Law
+from softtact.materials.laws.base import SIMPLE_SHEAR, Law
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
-Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
+Mode = Literal["uniaxial", "equibiaxial", "planar", "simple_shear", "volumetric"]
 _Model = TypeVar("_Model", bound=pydantic.BaseModel)
 
 
 def _rising(window):
-    if not 0 < window[0] < window[1]:
-        raise ValueError("a window is [from, to] with 0 < from < to")
+    if not window[0] < window[1]:
+        raise ValueError("a window is [from, to] with from < to")
     return window
 
 
+def _positive(windows):
+    if mode := next((mode for mode, (low, _) in windows.items() if low <= 0 and mode != SIMPLE_SHEAR), None):
+        raise ValueError(f"a window of {mode} is of stretches or volume ratios, above 0")
+    return windows
+
+
 Window = Annotated[tuple[float, float], pydantic.AfterValidator(_rising)]
+Windows = Annotated[dict[Mode, Window], pydantic.AfterValidator(_positive)]
 
 
 class SyntheticCurves(Section):
@@ -42,7 +49,7 @@ class SyntheticCurves(Section):
     noise: float = Field(ge=0, le=0.5, description="standard deviation as a share of a curve's largest stress")
     points: int = Field(ge=3, description="points per curve")
     seed: int = Field(ge=0)
-    modes: dict[Mode, Window] = Field(min_length=1, description="stretch (volume ratio) from, to in each test mode")
+    modes: Windows = Field(min_length=1, description="stretch (shear strain, volume ratio) from, to in each test mode")
     bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0 behind a volumetric curve")
 
 
@@ -58,6 +65,9 @@ class MeasuredFile(Section):
     decimal: Literal[".", ","] = Field(".", description="the decimal sign")
     skip_rows: int = Field(0, ge=0, description="lines above the header that are passed over")
     sheet: str | None = Field(None, description="of an Excel workbook that has several")
+    area_mm2: float | None = Field(None, gt=0, description="undeformed section, for a column of force")
+    length_mm: float | None = Field(None, gt=0, description="undeformed length, for a column of extension")
+    holds: Literal["instantaneous", "relaxed"] | None = Field(None, description="stress to take where steps relax")
 
 
 class MeasuredCurves(Section):
@@ -75,7 +85,7 @@ class FitSettings(Section):
     bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0 without a volumetric curve; 2/3 is Poisson's ratio 0")
     poisson: float | None = Field(None, gt=-1, lt=0.5, description="of the linear constants; curves do not hold it")
     small_strain: float = Field(0.1, gt=0, lt=1, description="strain up to which E is the slope")
-    window: dict[Mode, Window] = Field(default_factory=dict, description="stretch to use, all by default")
+    window: Windows = Field(default_factory=dict, description="stretch to use, all by default")
     residual: Literal["absolute", "relative"] = Field("absolute", description="errors in MPa, or over the stress")
     weights: dict[Mode, Annotated[float, Field(gt=0)]] = Field(default_factory=dict, description="of squared residuals, else 1")
     nonnegative: bool = Field(False, description="keep constants in MPa from being negative")
@@ -124,7 +134,9 @@ class MaterialConfig(Section):
     @property
     def curve_settings(self) -> dict[str, Any]:
         """Settings of the stage make_curves."""
-        return {"material": self.material} | self.curves.model_dump(mode="json")
+        settings = {"material": self.material} | self.curves.model_dump(mode="json", exclude_none=True)
+        window = self.fit.window if self.curves.kind == "measured" else {}
+        return settings | ({"window": {mode: list(ends) for mode, ends in window.items()}} if window else {})
 
     @property
     def fit_settings(self) -> dict[str, Any]:

@@ -3,31 +3,74 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path
-from softtact.materials.laws.base import TEST_PATHS, Law
+from softtact.materials.laws.base import SIMPLE_SHEAR, TEST_PATHS, Law, principal_stretches
 from softtact.unknown_names import unknown
 
 VOLUMETRIC = "volumetric"
-MODES = (*TEST_PATHS, VOLUMETRIC)
+MODES = (*TEST_PATHS, SIMPLE_SHEAR, VOLUMETRIC)
+
+
+class AnyCurve:
+    """What the curves of all test modes share.
+
+    mode: one of `MODES`;  kind: "measured" or "synthetic"
+    source: file, or how it was computed, for the record
+    remarks: sentences on its oddities, for the card's warnings
+    """
+
+    fields: ClassVar[tuple[str, str]]       # of the deformation and of the stress
+    names: ClassVar[tuple[str, str]]        # of their columns in a file
+    mode: str
+    kind: str
+    source: str
+    remarks: tuple
+
+    @property
+    def deformation(self) -> np.ndarray:
+        """(n,) stretch, shear strain or volume ratio."""
+        return getattr(self, self.fields[0])
+
+    @property
+    def stress(self) -> np.ndarray:
+        """(n,) nominal stress, shear stress or pressure, MPa."""
+        return getattr(self, self.fields[1])
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Smallest and largest stretch, shear strain or volume ratio."""
+        return float(self.deformation.min()), float(self.deformation.max())
+
+    def taken(self, rows: np.ndarray) -> Self:
+        """The curve of some of its rows: their indices, in order, or (n,) booleans."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in self.fields})   # type: ignore[type-var]
+
+    def within(self, window: Sequence[float]) -> Self:
+        """The part of the curve inside a window [min, max] of stretch, shear strain or volume ratio."""
+        return self.taken((self.deformation >= window[0]) & (self.deformation <= window[1]))
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """{name in a file: values (n,)}"""
+        return dict(zip(self.names, (self.deformation, self.stress), strict=True))
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(AnyCurve):
     """One test of shape at constant volume.
 
     mode: "uniaxial", "equibiaxial" or "planar"
     stretch: (n,) stretch of the loaded direction, below 1 in compression
     nominal_stress: (n,) force over undeformed area in MPa, negative in compression
-    kind: "measured" or "synthetic"
-    source: file, or how it was computed, for the record
-    remarks: sentences on its oddities, for the card's warnings
     """
 
+    fields = ("stretch", "nominal_stress")
+    names = ("stretch", "nominal_stress_mpa")
     mode: str
     stretch: np.ndarray
     nominal_stress: np.ndarray
@@ -35,31 +78,35 @@ class Curve:
     source: str = ""
     remarks: tuple = ()
 
-    @property
-    def window(self) -> tuple[float, float]:
-        """Smallest and largest stretch."""
-        return float(self.stretch.min()), float(self.stretch.max())
 
-    def within(self, window: Sequence[float]) -> Self:
-        """The part of the curve inside a window [min, max] of stretch."""
-        keep = (self.stretch >= window[0]) & (self.stretch <= window[1])
-        return replace(self, stretch=self.stretch[keep], nominal_stress=self.nominal_stress[keep])
+@dataclass(frozen=True)
+class ShearCurve(AnyCurve):
+    """One test of simple shear at constant volume.
 
-    @property
-    def columns(self) -> dict[str, np.ndarray]:
-        """{name in a file: values (n,)}"""
-        return {"stretch": self.stretch, "nominal_stress_mpa": self.nominal_stress}
+    shear_strain: (n,) gamma, displacement over thickness
+    shear_stress: (n,) force along the sheared face over its area in MPa, of the sign of gamma
+    """
+
+    fields = ("shear_strain", "shear_stress")
+    names = ("shear_strain", "shear_stress_mpa")
+    shear_strain: np.ndarray
+    shear_stress: np.ndarray
+    kind: str = "measured"
+    source: str = ""
+    remarks: tuple = ()
+    mode = SIMPLE_SHEAR
 
 
 @dataclass(frozen=True)
-class VolumetricCurve:
+class VolumetricCurve(AnyCurve):
     """One test of volume under pressure from all sides.
 
     volume_ratio: (n,) J, volume over undeformed volume, below 1 in compression
     pressure: (n,) in MPa, positive in compression
-    kind, source, remarks: as of a `Curve`
     """
 
+    fields = ("volume_ratio", "pressure")
+    names = ("volume_ratio", "pressure_mpa")
     volume_ratio: np.ndarray
     pressure: np.ndarray
     kind: str = "measured"
@@ -67,45 +114,34 @@ class VolumetricCurve:
     remarks: tuple = ()
     mode = VOLUMETRIC
 
-    @property
-    def window(self) -> tuple[float, float]:
-        """Smallest and largest volume ratio."""
-        return float(self.volume_ratio.min()), float(self.volume_ratio.max())
 
-    def within(self, window: Sequence[float]) -> Self:
-        """The part of the curve inside a window [min, max] of the volume ratio."""
-        keep = (self.volume_ratio >= window[0]) & (self.volume_ratio <= window[1])
-        return replace(self, volume_ratio=self.volume_ratio[keep], pressure=self.pressure[keep])
-
-    @property
-    def columns(self) -> dict[str, np.ndarray]:
-        """{name in a file: values (n,)}"""
-        return {"volume_ratio": self.volume_ratio, "pressure_mpa": self.pressure}
+def make_curve(mode: str, deformation: np.ndarray, stress: np.ndarray, **record: Any) -> AnyCurve:
+    """The curve of a mode; record: kind, source and remarks."""
+    if mode == SIMPLE_SHEAR:
+        return ShearCurve(deformation, stress, **record)
+    return VolumetricCurve(deformation, stress, **record) if mode == VOLUMETRIC else Curve(mode, deformation, stress, **record)
 
 
-def join_by_mode(curves: Sequence[Curve | VolumetricCurve]) -> list[Curve | VolumetricCurve]:
+def join_by_mode(curves: Sequence[AnyCurve]) -> list[AnyCurve]:
     """One curve per mode, its points sorted; for example from a tension and a compression test of the same material."""
     return [_join([curve for curve in curves if curve.mode == mode]) for mode in dict.fromkeys(c.mode for c in curves)]
 
 
 def _join(curves):
-    names = list(curves[0].columns)
-    x, y = (np.concatenate([curve.columns[name] for curve in curves]) for name in names)
+    x, y = (np.concatenate([getattr(curve, name) for curve in curves]) for name in curves[0].fields)
     order = np.argsort(x, kind="stable")
-    fields = ("volume_ratio", "pressure") if curves[0].mode == VOLUMETRIC else ("stretch", "nominal_stress")
-    return replace(curves[0], **dict(zip(fields, (x[order], y[order]), strict=True)), kind=common_kind(curves),
-                   source="; ".join(curve.source for curve in curves),
-                   remarks=tuple(remark for curve in curves for remark in curve.remarks))
+    return make_curve(curves[0].mode, x[order], y[order], kind=common_kind(curves), source="; ".join(c.source for c in curves),
+                      remarks=tuple(remark for curve in curves for remark in curve.remarks))
 
 
-def common_kind(curves: Sequence[Curve | VolumetricCurve]) -> str:
+def common_kind(curves: Sequence[AnyCurve]) -> str:
     """`measured` only if every curve is."""
     return "measured" if all(curve.kind == "measured" for curve in curves) else "synthetic"
 
 
 def synthetic_curve(law: Law, mode: str, window: tuple[float, float], *, points: int, noise: float,
-                    seed: int | Sequence[int]) -> Curve | VolumetricCurve:
-    """A `Curve` (or `VolumetricCurve`) of `law` at `points` even stretches (volume ratios) in `window`, with normal noise.
+                    seed: int | Sequence[int]) -> AnyCurve:
+    """The curve of `law` in a mode at `points` even stretches (shear strains, volume ratios) in `window`, with normal noise.
 
     noise: standard deviation as a share of the curve's largest stress, like a load cell's share of full scale
     seed: int or sequence of int for numpy's generator
@@ -116,12 +152,10 @@ def synthetic_curve(law: Law, mode: str, window: tuple[float, float], *, points:
     values = ", ".join(f"{name} {value:g}" for name, value in law.parameters.items())
     volume = f"bulk modulus {law.bulk_modulus:g}" if mode == VOLUMETRIC else "incompressible"
     making = f"{law.name} ({values}), {volume}, normal noise of {noise:.3g} of the largest stress, seed {seed}"
-    if mode == VOLUMETRIC:
-        return VolumetricCurve(x, stress + error, "synthetic", making)
-    return Curve(mode, x, stress + error, "synthetic", making)
+    return make_curve(mode, x, stress + error, kind="synthetic", source=making)
 
 
-def write_curve(path: str | Path, curve: Curve | VolumetricCurve) -> None:
+def write_curve(path: str | Path, curve: AnyCurve) -> None:
     """Write a curve as CSV: `# key: value` lines with mode, kind, source and remarks, then its two columns."""
     lines = [f"# mode: {curve.mode}", f"# kind: {curve.kind}", f"# source: {curve.source}"]
     lines += [f"# remark: {remark}" for remark in curve.remarks]
@@ -147,10 +181,18 @@ def refuse_idle(window: Mapping[str, Sequence[float]], weights: Mapping[str, flo
 
 
 def principal_window(windows: Mapping[str, Sequence[float]]) -> tuple[float, float] | None:
-    """Lowest and highest principal stretch over {mode: [min, max] stretch along the loading}; None without a test of shape."""
-    stretches = [stretch**exponent for mode, window in windows.items() if mode in TEST_PATHS
-                 for stretch in window for exponent in TEST_PATHS[mode]]
-    return (min(stretches), max(stretches)) if stretches else None
+    """Lowest and highest principal stretch over {mode: [min, max] stretch or shear strain}; None without a test of shape."""
+    stretches = [principal_stretches(mode, np.array(window)) for mode, window in windows.items()
+                 if mode in (*TEST_PATHS, SIMPLE_SHEAR)]
+    return (float(np.min(stretches)), float(np.max(stretches))) if stretches else None
+
+
+def path_of(mode: str, window: Sequence[float]) -> tuple[str, tuple[float, float]]:
+    """(mode of `TEST_PATHS`, window of its stretch) with the principal stretches of a test mode of shape over its window."""
+    if mode != SIMPLE_SHEAR:
+        return mode, (window[0], window[1])
+    low, high = principal_stretches(mode, np.array(window))[:, 0].tolist()
+    return "planar", (low, high)
 
 
 def path_window(principal: tuple[float, float], mode: str) -> tuple[float, float]:

@@ -13,8 +13,8 @@ from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import qmc
 
 from softtact.errors import InputError
-from softtact.materials.curves import Curve
-from softtact.materials.laws.base import Law, principal_stretches
+from softtact.materials.curves import AnyCurve
+from softtact.materials.laws.base import Law, principal_stretches, work_divisor
 from softtact.materials.laws.registry import LAWS, law_class
 
 STARTS = 24
@@ -91,18 +91,20 @@ class Points:
     """All points of the curves.
 
     stretches: (n, 3) principal stretches;  stress: (n,) nominal, MPa;  mode: (n,) of each
+    divisor: (n,) (t_1 - t_3)/nominal stress
     floor: (n,) the stress in MPa below which relative errors are taken over this
     """
 
     stretches: np.ndarray
     stress: np.ndarray
     mode: np.ndarray
+    divisor: np.ndarray
     floor: np.ndarray
 
     def predict(self, law: Law) -> np.ndarray:
         """Nominal stress (n,) of a law in MPa."""
         t = law.principal_stress(self.stretches)
-        return (t[:, 0] - t[:, 2]) / self.stretches[:, 0]
+        return (t[:, 0] - t[:, 2]) / self.divisor
 
     @property
     def size(self) -> np.ndarray:
@@ -114,18 +116,20 @@ class Points:
         return {str(mode): measure(values[self.mode == mode]) for mode in dict.fromkeys(self.mode)}
 
 
-def collect(curves: Sequence[Curve]) -> Points:
+def collect(curves: Sequence[AnyCurve]) -> Points:
     """`Points` of a list of curves."""
-    largest = [np.full(len(curve.stretch), np.abs(curve.nominal_stress).max()) for curve in curves]
+    largest = [np.full(len(curve.stress), np.abs(curve.stress).max()) for curve in curves]
+    stretches = [principal_stretches(curve.mode, curve.deformation) for curve in curves]
     return Points(
-        stretches=np.concatenate([principal_stretches(curve.mode, curve.stretch) for curve in curves]),
-        stress=np.concatenate([curve.nominal_stress for curve in curves]),
-        mode=np.concatenate([np.full(len(curve.stretch), curve.mode) for curve in curves]),
+        stretches=np.concatenate(stretches),
+        stress=np.concatenate([curve.stress for curve in curves]),
+        mode=np.concatenate([np.full(len(curve.stress), curve.mode) for curve in curves]),
+        divisor=np.concatenate([work_divisor(curve.mode, at) for curve, at in zip(curves, stretches, strict=True)]),
         floor=_RELATIVE_FLOOR * np.concatenate(largest),
     )
 
 
-def errors_of(law: Law, curves: Sequence[Curve]) -> tuple[float, float]:
+def errors_of(law: Law, curves: Sequence[AnyCurve]) -> tuple[float, float]:
     """(RMSE in MPa, root mean square relative error) of a law on curves."""
     points = collect(curves)
     error = points.predict(law) - points.stress
@@ -137,7 +141,7 @@ def law_names(laws: str | Sequence[str]) -> list[str]:
     return list(LAWS) if laws in ("all", ["all"]) else [laws] if isinstance(laws, str) else list(laws)
 
 
-def fit_law(name: str, curves: Sequence[Curve], **options: Any) -> LawFit:
+def fit_law(name: str, curves: Sequence[AnyCurve], **options: Any) -> LawFit:
     """Fit one law to all curves at once; options are those of `FitOptions`."""
     kind, points, settings = law_class(name, fitted=True), collect(curves), FitOptions(**options)
     if len(points.stress) <= len(kind.constants):

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.curves import Curve, VolumetricCurve
+from softtact.materials.curves import AnyCurve, VolumetricCurve
 
 # A test whose stiffness p/(1-J) differs from a constant K by more than this is reported: U has no second constant.
 _CURVED = 0.05
@@ -50,7 +50,7 @@ class LinearConstants:
         return self.young_mpa / (3 * (1 - 2 * self.poisson))
 
 
-def young_modulus(curves: Sequence[Curve | VolumetricCurve], *, small_strain: float) -> tuple[float, float, float]:
+def young_modulus(curves: Sequence[AnyCurve], *, small_strain: float) -> tuple[float, float, float]:
     """(E, its standard error, RMSE) in MPa from the uniaxial points with strain up to `small_strain`.
 
     The stress is fitted by E e + b e^2: without the square, points on one side of zero bias the slope by some percent.

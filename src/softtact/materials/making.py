@@ -7,7 +7,7 @@ from typing import Any
 
 from softtact.errors import InputError
 from softtact.materials.config import MeasuredCurves, SyntheticCurves, validated
-from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, synthetic_curve, write_curve
+from softtact.materials.curves import AnyCurve, join_by_mode, synthetic_curve, write_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.readers import read_curve
 
@@ -26,14 +26,15 @@ def make_curves(measured: str | Path | Sequence[str | Path], curves: str | Path 
         write_curve(path, by_mode[path.stem])
 
 
-def curves_of(settings: dict[str, Any], *, measured: str | Path | Sequence[str | Path] = ()) -> list[Curve | VolumetricCurve]:
+def curves_of(settings: dict[str, Any], *, measured: str | Path | Sequence[str | Path] = ()) -> list[AnyCurve]:
     """The curves, one per mode, that `MaterialConfig.curve_settings` describe; `measured`: current paths of the user's files."""
     settings = dict(settings)
     material = settings.pop("material", None)
     if material is None:
         raise InputError("settings of make_curves: the key material is missing; add it.")
     if settings.get("kind") == "measured":
-        return _measured(material, _paths(measured), settings)
+        window = settings.pop("window", {})
+        return _measured(material, _paths(measured), settings, window)
     return _synthetic(material, settings)
 
 
@@ -49,12 +50,12 @@ def _synthetic(material, settings):
     ]
 
 
-def _measured(material, paths, settings):
+def _measured(material, paths, settings, window):
     """Curves from the user's files, those of one mode joined."""
     files = validated(MeasuredCurves, settings, where=f"material {material}, curves").files
     paths = paths or [Path(file.file) for file in files]
     options = [file.model_dump(exclude={"file"}) for file in files]
-    return join_by_mode([read_curve(path, **option) for path, option in zip(paths, options, strict=True)])
+    return join_by_mode([read_curve(path, window=window, **option) for path, option in zip(paths, options, strict=True)])
 
 
 def _number(text):

@@ -24,6 +24,7 @@ TEST_PATHS = {
     "equibiaxial": (1.0, 1.0, -2.0),
     "planar": (1.0, 0.0, -1.0),
 }
+SIMPLE_SHEAR = "simple_shear"     # F = I + gamma e1 x e2: the principal stretches of planar tension, with turning axes
 
 
 @dataclass(frozen=True)
@@ -129,14 +130,15 @@ class Law:
         raise NotImplementedError
 
     def nominal_stress(self, mode: str, stretch: float | np.ndarray) -> np.ndarray:
-        """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test.
+        """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial`, `planar` or `simple_shear` test.
 
+        stretch: of the loaded direction; in simple shear the shear strain gamma, and the stress is the shear stress dpsi/dgamma
         A law with a `stretch_window` warns (`ExtrapolationWarning`) of stretches outside it.
         """
         stretches = principal_stretches(mode, stretch)
         self._warn_outside(stretches)
         stress = self.principal_stress(stretches)
-        return (stress[..., 0] - stress[..., 2]) / stretch
+        return (stress[..., 0] - stress[..., 2]) / work_divisor(mode, stretches)
 
     def _warn_outside(self, stretches):
         if self.stretch_window is None:
@@ -164,10 +166,24 @@ class Law:
 
 
 def principal_stretches(mode: str, stretch: float | np.ndarray) -> np.ndarray:
-    """Principal stretches (..., 3) of the incompressible material at the stretch (...) of a test mode."""
+    """Principal stretches (..., 3) of the incompressible material at the stretch (shear strain) (...) of a test mode."""
+    if mode == SIMPLE_SHEAR:    # l - 1/l = gamma
+        half = np.asarray(stretch, float) / 2
+        return np.exp(np.arcsinh(half))[..., None] ** np.array(TEST_PATHS["planar"])
     if mode not in TEST_PATHS:
-        raise InputError(f"Test mode {mode!r} is unknown; use one of {', '.join(TEST_PATHS)}.")
+        raise InputError(f"Test mode {mode!r} is unknown; use one of {', '.join(TEST_PATHS)}, {SIMPLE_SHEAR}.")
     return np.asarray(stretch, float)[..., None] ** np.array(TEST_PATHS[mode])
+
+
+def work_divisor(mode: str, stretches: np.ndarray) -> np.ndarray:
+    """(t_1 - t_3)/nominal stress (...) at principal stretches (..., 3): l_1, or in simple shear dgamma/dln l_1 = l_1 + 1/l_1."""
+    loaded = stretches[..., 0]
+    return loaded + 1 / loaded if mode == SIMPLE_SHEAR else loaded
+
+
+def rest_of(mode: str) -> float:
+    """The stretch, shear strain or volume ratio of a test mode without load."""
+    return 0.0 if mode == SIMPLE_SHEAR else 1.0
 
 
 def _root(function):

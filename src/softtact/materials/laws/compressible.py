@@ -18,7 +18,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from softtact.compiled import compiled
-from softtact.errors import InputError
 from softtact.materials.laws.base import TEST_PATHS, IsochoricResponse, Law
 from softtact.materials.laws.stretches import dyads, eigen, quotient, response, sum_dyads
 
@@ -56,9 +55,12 @@ class CompressibleLaw(Law):
         return (np.expm1(logs[..., None] * self._alpha) - volume[..., None, :]) @ (2 * self._mu / self._alpha)
 
     def nominal_stress(self, mode: str, stretch: float | np.ndarray) -> np.ndarray:
-        """Nominal stress (MPa) in a `uniaxial`, `equibiaxial` or `planar` test, whose free sides are without stress."""
+        """Nominal stress (MPa) in a `uniaxial`, `equibiaxial` or `planar` test, whose free sides are without stress.
+
+        In `simple_shear`, which keeps the volume, it is the shear stress at the shear strain.
+        """
         if mode not in TEST_PATHS:
-            raise InputError(f"Test mode {mode!r} is unknown; use one of {', '.join(TEST_PATHS)}.")
+            return super().nominal_stress(mode, stretch)
         stretches = np.array([self._stretches(mode, value) for value in np.ravel(stretch)]).reshape(*np.shape(stretch), 3)
         self._warn_outside(stretches)
         return self.principal_stress(stretches)[..., 0] / np.asarray(stretch, float)
