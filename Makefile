@@ -66,7 +66,7 @@ advice: .venv/tested
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --no-compile -c constraints.txt -e '.[workflow,learn,view,optics,mesh,excel,skin,robot,mkl]'
+	$(BIN)/python -m pip install --quiet --no-compile -c constraints.txt -e '.[workflow,learn,view,optics,mesh,excel,cad,skin,robot,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed

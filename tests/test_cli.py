@@ -235,7 +235,7 @@ def test_the_package_and_its_help_load_no_heavy_library():
 
 def test_a_refusal_is_one_sentence_and_a_status(refused):
     for arguments, status, said in [
-        (["press", OBJECT, "--force", 20], 2, "--unit"),
+        (["press", OBJECT, "--force", 20], 1, "--unit"),
         (["press", OBJECT, "--unit", "furlong", "--force", 20], 2, "furlong"),
         (["press", OBJECT, "--unit", "mm", "--force", 0], 1, "0 N"),
         (["press", OBJECT, "--unit", "mm", "--force", 51], 1, "51 N"),

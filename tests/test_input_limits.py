@@ -46,12 +46,23 @@ def an_archive(path):
     return read_archive(path, columns=28, force=True, outliers=Outliers())
 
 
-@pytest.mark.parametrize(("name", "read"), [
+READERS = [
     ("sensor.yaml", lambda path: read_yaml(path, missing="")), ("card.json", read_json), ("recording.csv", read_recording),
     ("curve.xlsx", read_sheet), ("part.stl", a_mesh), ("part.obj", a_mesh), ("part.ply", a_mesh),
+    ("part.step", a_mesh), ("part.zip", a_mesh),
     ("body.vtu", lambda path: read_mesh_file(path, unit="mm")), ("pressed.vtu", read_vtu), ("press.nc", read_dataset),
     ("cache.npz", read_npz), ("model.pt", load), ("frame.png", read_frame), ("image.png", read_image),
-    ("clip.mp4", read_frame), ("markers.csv", MarkerMotion.read), ("Flat_Real_Abaqus.csv", an_archive)])
+    ("clip.mp4", read_frame), ("markers.csv", MarkerMotion.read), ("Flat_Real_Abaqus.csv", an_archive)]
+
+
+@pytest.mark.parametrize(("name", "read"), READERS)
+def test_a_pointer_of_git_lfs_is_named_as_what_it_is(name, read, tmp_path):
+    (tmp_path / name).write_text(f"version https://git-lfs.github.com/spec/v1\noid sha256:{64 * '4'}\nsize 12345\n")
+    with pytest.raises(InputError, match=rf"{name}: it is a pointer of Git LFS, the file itself was not fetched; run git lfs pull"):
+        read(tmp_path / name)
+
+
+@pytest.mark.parametrize(("name", "read"), READERS)
 def test_a_huge_file_is_refused_by_its_size(name, read, tmp_path):
     with open(tmp_path / name, "wb") as file:
         file.truncate(int(HUGE))

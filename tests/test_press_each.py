@@ -71,7 +71,7 @@ def test_where_several_results_go_must_be_a_folder(more, said, parts, tmp_path, 
 
 def test_a_folder_without_meshes_is_refused(tmp_path, capsys):
     assert main(["press", str(tmp_path), *HOW, "--out", str(tmp_path / "r")]) == 1
-    assert "the folder holds no STL, OBJ or PLY file" in capsys.readouterr().err
+    assert "the folder holds no file of STL, OBJ, PLY" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [["--pose", "-1,0,0,0,0,0"], ["--motion", "-.5z"], ["--force", "-5e0"], ["--pos", "-1,0"]])

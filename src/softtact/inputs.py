@@ -11,11 +11,12 @@ import os
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from softtact.errors import InputError, SofttactError, UnreadableError
 
 VARIABLE = "SOFTTACT_LIMITS"
+_POINTER = b"version https://git-lfs.github.com/spec/"
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,19 @@ def check_input(path: str | Path, kind: str, *, missing: str = "there is no such
     if not os.access(path, os.R_OK):
         raise unreadable(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
     check_limit(path, kind, found.st_size)
+    with open(path, "rb") as file:
+        refuse_pointer(path, file.read(len(_POINTER)))
+
+
+def refuse_pointer(path: str | Path, beginning: bytes) -> None:
+    """Refuse what a clone without Git LFS leaves in place of a file, by the file's first bytes."""
+    if beginning.startswith(_POINTER):
+        raise InputError(f"{path}: it is a pointer of Git LFS, the file itself was not fetched; run git lfs pull.")
+
+
+def is_hidden(path: PurePath) -> bool:
+    """Whether a file is one that systems hide and put beside others, such as ._part.stl and .DS_Store of macOS."""
+    return path.name.startswith(".")
 
 
 def no_name(error: OSError | ValueError) -> str:

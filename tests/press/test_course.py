@@ -181,7 +181,7 @@ def test_a_file_and_a_matrix_press_as_a_mesh_and_a_pose_do(sensor, tmp_path):
 
 def test_a_file_without_its_unit_and_a_matrix_that_scales_are_refused(sensor, tmp_path):
     BALL.export(tmp_path / "ball.stl")
-    with pytest.raises(InputError, match="a mesh file does not state its unit; give unit='mm'"):
+    with pytest.raises(InputError, match="no unit is stated, and the file holds none; state one of mm"):
         sensor.press(tmp_path / "ball.stl", force_n=0.5)
     with pytest.raises(InputError, match="is no rigid motion"):
         sensor.press(BALL, pose=np.diag([2.0, 2.0, 2.0, 1.0]), force_n=0.5)

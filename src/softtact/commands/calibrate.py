@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from softtact.commands.common import UNITS, add_command, check_names, sensor_path, sensor_spec, show
+from softtact.commands.common import add_command, add_unit, check_names, report_reading, sensor_path, sensor_spec, show
 from softtact.errors import InputError
 from softtact.outputs import check_outputs, refuse_overwriting
 
@@ -23,7 +23,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="recordings of the maker's recorder, one press each")
     command.add_argument("--press", action="append", required=True, type=Path, metavar="OBJECT.stl",
                          help="what was pressed, lowest side down: one for all recordings, or one for each")
-    command.add_argument("--unit", required=True, choices=UNITS, help="the meshes' unit")
+    add_unit(command)
     command.add_argument("--force", action="append", required=True, metavar="N|FILE.csv",
                          help="N of a weight that is laid on and held, or a log with time_s and force_n; one for all, or for each")
     command.add_argument("--place", action="append", metavar="x,y,angle",
@@ -61,6 +61,8 @@ def _calibrate(options):
     sensor = uncalibrated(sensor_path(options.sensor))
     objects = [mesh for _, mesh, _, _ in given] + (options.candidate or [])
     meshes = {path: read_mesh(path, unit=options.unit) for path in dict.fromkeys(objects)}
+    for path, mesh in meshes.items():
+        report_reading(options, path, mesh.metadata["notes"])
     read = [_experiment(path, meshes[mesh], force, _place(place), options, spec) for path, mesh, force, place in given]
     experiments, notes = [one for one, _ in read], [note for _, notes_of_one in read for note in notes_of_one]
     problem = Problem(Presses(sensor, model=options.model), experiments, fitted)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 UNITS = ("mm", "cm", "m", "inch", "in")
+MESH_FILE = "file of a closed body: STL, OBJ, PLY, OFF, 3MF, AMF, GLB or STEP, or one of them in a ZIP archive"
 EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, meaning in EXIT_STATUS.items())
 
 
@@ -36,14 +37,20 @@ def add_mesh(command: argparse.ArgumentParser, *, several: bool = False) -> None
     """The arguments of a mesh over a sensor, or of `several`."""
     if several:
         command.add_argument("mesh", metavar="MESH", type=Path, nargs="+",
-                             help="STL, OBJ or PLY file of a closed body; several, or a folder of them, are pressed one by one")
+                             help=f"{MESH_FILE}; several, or a folder of them, are pressed one by one")
     else:
-        command.add_argument("mesh", metavar="MESH", type=Path, help="STL, OBJ or PLY file of a closed body")
-    command.add_argument("--unit", required=True, choices=UNITS, help="the mesh's unit, which the file does not state")
+        command.add_argument("mesh", metavar="MESH", type=Path, help=MESH_FILE)
+    add_unit(command)
     command.add_argument("--pose", metavar="x,y,z,rx,ry,rz",
                          help="the mesh's origin in the sensor's frame, mm and degrees (default: centred, touching); "
                               "write --pose=-1,... where it begins with a minus")
     command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor (default: coro)")
+
+
+def add_unit(command: argparse.ArgumentParser) -> None:
+    """The option of the unit of mesh files."""
+    command.add_argument("--unit", choices=UNITS, help="the mesh's unit, which STL, OBJ, PLY and OFF files do not state; for other "
+                                                       "formats it may be left out, and is that of the file")
 
 
 def add_repair(command: argparse.ArgumentParser) -> None:
@@ -54,16 +61,25 @@ def add_repair(command: argparse.ArgumentParser) -> None:
 
 
 def read_object(options: argparse.Namespace, path: Path) -> "tuple[trimesh.Trimesh, list[str]]":
-    """A mesh of the command line (trimesh, mm) and the list of its repairs, which also go to stderr."""
+    """A mesh of the command line (trimesh, mm) and the list of its repairs, which go to stderr, as does how it was read."""
     from softtact.geometry.meshes import read_mesh
     from softtact.geometry.repair import read_mended
 
     if not options.repair:
-        return read_mesh(path, unit=options.unit), []
+        mesh = read_mesh(path, unit=options.unit)
+        report_reading(options, path, mesh.metadata["notes"])
+        return mesh, []
     mended = read_mended(path, unit=options.unit)
+    report_reading(options, path, mended.notes)
     for repair in mended.repairs:
         print(f"softtact {options.command}: {path} was repaired: {repair}", file=sys.stderr)
     return mended.mesh, mended.repairs
+
+
+def report_reading(options: argparse.Namespace, path: Path, notes: Iterable[str]) -> None:
+    """Report on stderr how a mesh file was read."""
+    for note in notes:
+        print(f"softtact {options.command}: {path}: {note}", file=sys.stderr)
 
 
 def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
@@ -98,8 +114,9 @@ def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
     """The inputs of a press, as attributes of its file."""
     import hashlib
 
-    return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "unit": options.unit,
-            "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *options.given])}
+    return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+            "unit": options.unit or "that of the file", "pose": options.pose or "centred, touching",
+            "command": " ".join(["softtact", *options.given])}
 
 
 def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:

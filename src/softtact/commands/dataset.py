@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 
 import softtact
-from softtact.commands.common import UNITS, add_command, add_repair, check_forces, read_object, sensor_spec, show
-from softtact.commands.press_each import MESHES
+from softtact.commands.common import add_command, add_repair, add_unit, check_forces, read_object, sensor_spec, show
 from softtact.errors import InputError
 from softtact.outputs import check_outputs
 
@@ -21,8 +20,9 @@ _FORCES_N = (5.0, 10.0, 20.0, 40.0)
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "dataset", _dataset, "Random presses of objects as a data set for learning.", EXAMPLES)
-    command.add_argument("mesh", metavar="OBJECT", type=Path, nargs="+", help="STL, OBJ or PLY files of closed bodies, or folders")
-    command.add_argument("--unit", required=True, choices=UNITS, help="the meshes' unit, which the files do not state")
+    command.add_argument("mesh", metavar="OBJECT", type=Path, nargs="+",
+                         help="mesh files of closed bodies (STL, OBJ, PLY, OFF, 3MF, AMF, GLB, STEP), or folders")
+    add_unit(command)
     add_repair(command)
     command.add_argument("--presses", type=int, required=True, metavar="N", help="in all; the objects take turns")
     command.add_argument("--force", type=float, action="append", metavar="N",
@@ -70,10 +70,9 @@ def _dataset(options):
 
 def _meshes(options):
     """{name: mesh} of files and folders."""
-    paths = [file for path in options.mesh
-             for file in (sorted(one for one in path.iterdir() if one.suffix.lower() in MESHES) if path.is_dir() else [path])]
-    if not paths:
-        raise InputError(f"{options.mesh[0]}: the folder holds no STL, OBJ or PLY file; name the folder with the meshes.")
+    from softtact.geometry.formats import meshes_in
+
+    paths = [file for path in options.mesh for file in (meshes_in(path) if path.is_dir() else [path])]
     names = [path.stem for path in paths]
     for name, path in zip(names, paths, strict=True):
         if names.count(name) > 1:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import softtact
 from softtact.commands.common import (
-    UNITS,
+    MESH_FILE,
     add_command,
     add_repair,
+    add_unit,
     check_forces,
     read_object,
     sensor_spec,
@@ -33,8 +34,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command = add_command(commands, "grasp", _grasp, "Grasp an object with a UR10 and a 2F-85 gripper: maps of both sensors.",
                           EXAMPLES)
     command.add_argument("mesh", metavar="OBJECT", type=Path, nargs="?",
-                         help="STL, OBJ or PLY file of a closed body; its z axis lies along the closing of the fingers")
-    command.add_argument("--unit", choices=UNITS, help="the mesh's unit, which the file does not state")
+                         help=f"{MESH_FILE}; its z axis lies along the closing of the fingers")
+    add_unit(command)
     add_repair(command)
     command.add_argument("--force", type=float, metavar="N", help="of each pad on the object, in N")
     for name, meaning in (("x", "along the sensor's short side, in mm"), ("y", "along its long side, towards the palm, in mm")):
@@ -84,9 +85,9 @@ def _new(options):
     from softtact.robot.scene import Placement, build_scene
     from softtact.robot.settings import load_scene
 
-    for name in ("mesh", "unit", "force"):
+    for name in ("mesh", "force"):
         if getattr(options, name) is None:
-            raise InputError(f"{'OBJECT' if name == 'mesh' else f'--{name}'} is missing: a grasp needs a mesh, its unit and a "
+            raise InputError(f"{'OBJECT' if name == 'mesh' else f'--{name}'} is missing: a grasp needs a mesh and a "
                              "force; or give --replay events.nc.")
     spec = sensor_spec(options.sensor)
     check_forces([options.force], spec)
@@ -98,10 +99,11 @@ def _new(options):
     mesh, _ = read_object(options, options.mesh)
     scene = build_scene(mesh, spec, settings, Placement(options.x, options.y, options.angle), mass_kg=options.mass)
     record = GraspRun(scene).run(options.force, lift=options.lift)
-    facts = {"mesh": str(options.mesh), "mesh_sha256": _digest(options.mesh), "unit": options.unit, "repair": int(options.repair),
-             "sensor_asked_for": options.sensor, "requested_force_n": options.force, "x_mm": options.x, "y_mm": options.y,
-             "angle_deg": options.angle, "mass_kg": scene.mass_kg, "model_asked_for": options.model, "policy": options.policy,
-             "tolerance_mm": options.tolerance, "shear": int(options.shear), "scene": settings.model_dump_json()}
+    facts = {"mesh": str(options.mesh), "mesh_sha256": _digest(options.mesh), "unit": options.unit or "",
+             "repair": int(options.repair), "sensor_asked_for": options.sensor, "requested_force_n": options.force,
+             "x_mm": options.x, "y_mm": options.y, "angle_deg": options.angle, "mass_kg": scene.mass_kg,
+             "model_asked_for": options.model, "policy": options.policy, "tolerance_mm": options.tolerance,
+             "shear": int(options.shear), "scene": settings.model_dump_json()}
     return _pressed(mesh, record, facts, options.workers), scene, record
 
 
@@ -125,7 +127,7 @@ def _replayed(options):
                          "mesh as OBJECT.")
     if _digest(path) != facts["mesh_sha256"]:
         raise InputError(f"{path}: it is not the mesh that {options.replay} was made with; give that one as OBJECT.")
-    options.unit, options.repair = facts["unit"], bool(facts["repair"])
+    options.unit, options.repair = facts["unit"] or None, bool(facts["repair"])
     mesh, _ = read_object(options, path)
     settings = SceneSettings.model_validate_json(facts["scene"])
     scene = build_scene(mesh, sensor_spec(facts["sensor_asked_for"]), settings,

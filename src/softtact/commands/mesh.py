@@ -9,10 +9,11 @@ import time
 from pathlib import Path
 
 from softtact.commands.common import (
-    UNITS,
+    MESH_FILE,
     add_command,
     add_mesh,
     add_repair,
+    add_unit,
     check_names,
     pairs,
     pose_of,
@@ -33,7 +34,6 @@ COMPLEXITY_EXAMPLES = """
   softtact complexity part.stl --unit mm
   softtact complexity part.stl --unit mm --pose=0,0,0,0,0,90 --rule all --json
 """
-_SURFACES = (".stl", ".obj", ".ply")
 _UNKNOWNS = 4.5                # for each element: measured 4.4 to 5.2
 _SECONDS = (0.5e-3, 2e-3)      # for each element, on one processor of 2023, idle and with other work
 
@@ -44,8 +44,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command = add_command(commands, "mesh", _mesh, "Fill a closed surface with quadratic tetrahedra, or take another program's "
                           "elements, for the solid model.", EXAMPLES)
     command.add_argument("mesh", metavar="BODY", type=Path,
-                         help="STL, OBJ or PLY file of a closed surface, or a file of elements (VTU, Gmsh, Abaqus, ...)")
-    command.add_argument("--unit", required=True, choices=UNITS, help="the file's unit, which it does not state")
+                         help=f"{MESH_FILE}; or a file of elements (VTU, Gmsh, Abaqus, ...)")
+    add_unit(command)
     command.add_argument("--size", type=float, metavar="MM", help="edge length in mm that elements in a surface shall have")
     command.add_argument("--envelope", type=float, metavar="MM",
                          help="details smaller than this may be lost (default: a twentieth of the size)")
@@ -82,12 +82,13 @@ def _complexity(options):
 
 def _mesh(options):
     from softtact.fem.mesh_files import write_mesh
+    from softtact.geometry.formats import SURFACES
 
     check_outputs(options.out)
     check_names({options.out: (".vtu",)})
     refuse_overwriting([options.mesh], {"--out": options.out})
     rules = dict(pairs("--face", options.face))
-    mesh, result = _filled(options, rules) if options.mesh.suffix.lower() in _SURFACES else _taken(options, rules)
+    mesh, result = _filled(options, rules) if options.mesh.suffix.lower() in SURFACES else _taken(options, rules)
     write_mesh(mesh, options.out)
     result = {"mesh": str(options.out)} | result | {"regions": mesh.regions, "faces": {name: sum(map(len, facets.values()))
                                                                                       for name, facets in mesh.faces.items()}}
@@ -130,7 +131,7 @@ def _taken(options, rules):
     for name in ("size", "envelope", "most_elements"):
         if getattr(options, name) is not None:
             raise InputError(f"--{name.replace('_', '-')}: {options.mesh} has elements already; leave the option out, or give a "
-                             f"surface ({', '.join(_SURFACES)}).")
+                             "surface (STL, OBJ, STEP, ...).")
     mesh = read_mesh_file(options.mesh, unit=options.unit, geometry=options.geometry, faces=rules,
                           regions=options.region)
     axes = 3 if mesh.geometry == "solid" else 2

@@ -11,7 +11,6 @@ from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.outputs import check_output_folder
 from softtact.progress import announce
 
-MESHES = (".stl", ".obj", ".ply")
 _PICTURES = ("vtu", "plot", "image", "movie")      # options that name a file in each object's folder
 
 
@@ -103,12 +102,11 @@ def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str,
 
 def _named(meshes):
     """{name of its results folder: path} of all meshes, those of a folder sorted by name."""
+    from softtact.geometry.formats import meshes_in
+
     paths: list[Path] = []
     for path in meshes:
-        found = sorted(file for file in path.iterdir() if file.suffix.lower() in MESHES) if path.is_dir() else [path]
-        if not found:
-            raise InputError(f"{path}: the folder holds no STL, OBJ or PLY file; name the folder with the meshes.")
-        paths += found
+        paths += meshes_in(path) if path.is_dir() else [path]
     stems = [path.stem for path in paths]
     names = [path.name if stems.count(path.stem) > 1 else path.stem for path in paths]
     for name, path in zip(names, paths, strict=True):

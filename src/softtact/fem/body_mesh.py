@@ -91,7 +91,7 @@ def mesh_body(surface: str | Path | trimesh.Trimesh, *, size_mm: float, unit: st
 def closed_surface(surface: str | Path | trimesh.Trimesh, *, unit: str | None = None) -> tuple[trimesh.Trimesh, str]:
     """A checked surface (mm) that bounds a body, and its name in messages."""
     if not isinstance(surface, trimesh.Trimesh):
-        return read_mesh(surface, unit=unit), str(surface)     # type: ignore[arg-type]
+        return read_mesh(surface, unit=unit), str(surface)
     name = Path("The surface")
     if unit is not None and unit not in UNIT_MM:
         raise InputError(f"{name}: the unit {unit!r} is not known; state one of {', '.join(UNIT_MM)}.")

@@ -60,7 +60,7 @@ def score(triangles: np.ndarray, *, footprint_mm: tuple[float, float], reach_mm:
     return Complexity(NPt=len(points), CHt=hull_edges(points), NPo=len(near), CHo=hull_edges(near))
 
 
-def score_file(path: str | Path, *, unit: str, footprint_mm: tuple[float, float], pose: Pose | None = None,
+def score_file(path: str | Path, *, unit: str | None = None, footprint_mm: tuple[float, float], pose: Pose | None = None,
                reach_mm: float = REACH_MM) -> Complexity:
     """`Complexity` of a mesh file that passes `read_mesh`; without a pose it is centred over the sensor."""
     mesh = read_mesh(path, unit=unit)

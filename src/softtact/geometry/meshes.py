@@ -12,14 +12,9 @@ import trimesh
 from manifold3d import Manifold, Mesh64
 
 from softtact.errors import InputError
-from softtact.geometry.obj import read_obj
-from softtact.geometry.ply import read_ply
+from softtact.geometry.formats import STATED_MM, UNIT_MM, Facets, in_mm, read_facets
 from softtact.geometry.pose import Pose
-from softtact.geometry.stl import read_stl
-from softtact.inputs import check_input, check_limit
 
-UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, "in": 25.4}
-_READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply}
 MIN_SIZE_MM = 1.0  # far below a taxel's resolution
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
 _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are merged
@@ -29,43 +24,54 @@ _SLIVER = 1e-3  # of the size: facets with a smaller height have no reliable nor
 OVERLAP = 1e-6  # of a body's volume: a smaller overlap is round-off
 
 
-def read_triangles(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
+def read_triangles(path: str | Path, *, unit: str | None = None, min_size_mm: float = MIN_SIZE_MM,
                    max_size_mm: float = MAX_SIZE_MM) -> np.ndarray:
     """Facets (n, 3, 3) in mm as the file stores them, corners not merged; finite and of plausible size."""
-    path = Path(path)
-    triangles = load_sized(path, unit=unit)
-    _refuse_non_finite(path, triangles)
-    return plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
+    return _plausible(Path(path), unit, min_size_mm, max_size_mm).triangles
 
 
-def load_sized(path: Path, *, unit: str) -> np.ndarray:
-    """Facets (n, 3, 3) in mm as the file stores them, unchecked."""
-    return _load_facets(path) * _unit_factor(path, unit)
+def _plausible(path, unit, min_size_mm, max_size_mm):
+    """`Facets` of a file in mm, finite and of plausible size."""
+    facets = load_sized(path, unit=unit)
+    _refuse_non_finite(path, facets.triangles)
+    plausible_facets(path, facets.triangles, unit=facets.unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
+    return facets
 
 
-def plausible_facets(path: Path, triangles: np.ndarray, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
+def load_sized(path: Path, *, unit: str | None) -> Facets:
+    """`Facets` in mm as the file stores them, unchecked."""
+    return in_mm(path, read_facets(path), unit)
+
+
+def plausible_facets(path: Path, triangles: np.ndarray, *, unit: str | None, min_size_mm: float = MIN_SIZE_MM,
                      max_size_mm: float = MAX_SIZE_MM) -> np.ndarray:
-    """The facets (n, 3, 3) in mm, if their size is plausible; else refused with the unit that would make it so."""
+    """The facets (n, 3, 3) in mm, if their size is plausible; else refused with the unit that would make it so.
+
+    unit: in which they were read; None stands for mm
+    """
     if len(triangles) == 0:
         raise InputError(f"{path}: no facet has finite coordinates; export the mesh again.")
-    _refuse_implausible_size(path, triangles, unit, min_size_mm, max_size_mm)
+    _refuse_implausible_size(path, triangles, unit or "mm", min_size_mm, max_size_mm)
     return triangles
 
 
-def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
+def read_mesh(path: str | Path, *, unit: str | None = None, min_size_mm: float = MIN_SIZE_MM,
               max_size_mm: float = MAX_SIZE_MM) -> trimesh.Trimesh:
     """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the frame of the file.
 
-    path : STL (binary or text), OBJ or PLY
-    unit : 'mm', 'cm', 'm', 'inch' or 'in'; mesh files do not state it
+    path : STL (binary or text), OBJ, PLY, OFF, 3MF, AMF, GLB or STEP, or a ZIP archive of one of them
+    unit : 'mm', 'cm', 'm', 'inch' or 'in'; needed where the format states none (STL, OBJ, PLY, OFF), else it must be the file's
     min_size_mm, max_size_mm : range of a plausible largest side
+
+    `metadata["notes"]` is a list of sentences on how the file was read: its own unit, and how closely facets follow curved faces.
 
     Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, folded, overlapping, of a
     wrong size) and the remedy.
     """
     path = Path(path)
-    triangles = read_triangles(path, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
-    mesh = merge_facets(triangles)
+    facets = _plausible(path, unit, min_size_mm, max_size_mm)
+    mesh = merge_facets(facets.triangles)
+    mesh.metadata["notes"] = list(facets.notes)
     check_body(path, mesh)
     refuse_folded(path, mesh)
     return mesh
@@ -156,27 +162,6 @@ def facets_over(triangles: np.ndarray, footprint_mm: tuple[float, float]) -> np.
     return np.all((along.min(axis=-1) <= reach) & (along.max(axis=-1) >= -reach), axis=1)
 
 
-def _load_facets(path: Path) -> np.ndarray:
-    """Facets (n, 3, 3) in the file's unit."""
-    check_input(path, "mesh", missing="there is no such mesh file.")
-    if path.suffix.lower() not in _READERS:
-        raise InputError(f"{path}: the format '{path.suffix}' is not read; save the mesh as STL, OBJ or PLY.")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; export the mesh again.")
-    triangles = _READERS[path.suffix.lower()](path)
-    check_limit(path, "facets", len(triangles))
-    if triangles.size == 0:
-        raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
-    return triangles
-
-
-def _unit_factor(path: Path, unit: str | None) -> float:
-    if unit not in UNIT_MM:
-        stated = "no unit is stated" if unit is None else f"the unit {unit!r} is not known"
-        raise InputError(f"{path}: {stated}, and a mesh file holds none; state one of {', '.join(UNIT_MM)}.")
-    return UNIT_MM[unit]
-
-
 def _refuse_non_finite(path: Path, triangles: np.ndarray) -> None:
     bad = ~np.isfinite(triangles).all(axis=(1, 2))
     if bad.any():
@@ -188,7 +173,7 @@ def _refuse_implausible_size(path: Path, triangles: np.ndarray, unit: str, small
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     if smallest <= size <= largest:
         return
-    sizes = {other: size / UNIT_MM[unit] * factor for other, factor in UNIT_MM.items() if other != unit}
+    sizes = {other: size / STATED_MM[unit] * factor for other, factor in UNIT_MM.items() if other != unit}
     plausible = [f"{other} ({value:.4g} mm)" for other, value in sizes.items() if smallest <= value <= largest]
     remedy = f"perhaps its unit is {' or '.join(plausible)}" if plausible else "scale the mesh"
     raise InputError(f"{path}: read in {unit}, its largest side is {size:.4g} mm, outside {smallest:g} to "

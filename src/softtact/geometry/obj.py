@@ -25,9 +25,9 @@ _VERTICES = re.compile(rb"(?:[ \t]*+v(?:[ \t]++[-+.\deE]++){3}[ \t]*+\n){1,20000
 _FACES = re.compile(rb"(?:[ \t]*+f(?:[ \t]++\d{1,18}+(?:/\d*+){0,2}+){3,}+[ \t]*+\n){1,20000}+")
 
 
-def read_obj(path: Path) -> np.ndarray:
+def read_obj(path: Path, data: bytes) -> np.ndarray:
     """Triangles (n, 3, 3) of an OBJ file in its unit; InputError names the line that is refused."""
-    data = plain_text(path, path.read_bytes()) + b"\n"
+    data = plain_text(path, data) + b"\n"
     if b"#" in data:
         data = re.sub(rb"#[^\n]*", b"", data)
     if data.rstrip().endswith(b"\\"):
@@ -107,10 +107,10 @@ class _Statements:
         return end + 1
 
     def _vertex(self, words):
-        if len(words) not in (3, 4, 6):
-            raise self._refusal(f"a vertex has three coordinates, alone or with a weight or a colour of three, not {len(words)} "
-                                f"numbers; {_AGAIN}")
-        numbers = words[:3] if len(words) == 6 else words
+        if len(words) not in (3, 4, 6, 7):
+            raise self._refusal(f"a vertex has three coordinates, alone or with a weight or a colour of three or four, not "
+                                f"{len(words)} numbers; {_AGAIN}")
+        numbers = words[:3] if len(words) > 4 else words
         for word in numbers:
             if not is_finite(word):
                 raise no_number(self.path, self.line, word)

@@ -67,9 +67,8 @@ class Rows:
     places: np.ndarray
 
 
-def read_ply(path: Path) -> np.ndarray:
+def read_ply(path: Path, data: bytes) -> np.ndarray:
     """Triangles (n, 3, 3) of a PLY file in its unit; InputError where it does not hold what its header declares."""
-    data = path.read_bytes()
     first = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
     if first is None:
         raise InputError(f"{path}: its first line is not 'ply'; {_AGAIN}")

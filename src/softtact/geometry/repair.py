@@ -38,28 +38,30 @@ _SMALL_HOLES = 0.05  # of the surface: area of curved holes that are also closed
 
 @dataclass(frozen=True)
 class Mended:
-    """A closed mesh (trimesh, mm) and sentences on its repairs."""
+    """A closed mesh (trimesh, mm), and sentences on its repairs and on how its file was read."""
 
     mesh: trimesh.Trimesh
     repairs: list
+    notes: list
 
 
-def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM, max_size_mm: float = MAX_SIZE_MM) -> Mended:
+def read_mended(path: str | Path, *, unit: str | None = None, min_size_mm: float = MIN_SIZE_MM,
+                max_size_mm: float = MAX_SIZE_MM) -> Mended:
     """Read a mesh as `read_mesh` does, and repair it where that is not ambiguous; else InputError with the reason."""
     path = Path(path)
     repairs: list[str] = []
     stored = load_sized(path, unit=unit)
-    triangles = _finite(stored, repairs)
-    plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
+    triangles = _finite(stored.triangles, repairs)
+    plausible_facets(path, triangles, unit=stored.unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
     if len(mesh.faces) == 0 or np.ptp(mesh.vertices, axis=0).min() == 0:
         check_body(path, mesh)     # it is degenerate, which no step repairs
     try:
         check_body(path, mesh)
     except InputError:
-        return Mended(_mended(path, mesh, repairs), repairs)
+        return Mended(_mended(path, mesh, repairs), repairs, list(stored.notes))
     refuse_folded(path, mesh)
-    return Mended(mesh, repairs)
+    return Mended(mesh, repairs, list(stored.notes))
 
 
 def _mended(path, mesh, repairs):

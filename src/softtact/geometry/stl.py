@@ -23,9 +23,8 @@ _SOLID = re.compile(rb"\s*solid(?!\S)[^\n]*")
 _AGAIN = "export the mesh again."
 
 
-def read_stl(path: Path) -> np.ndarray:
+def read_stl(path: Path, data: bytes) -> np.ndarray:
     """Facets (n, 3, 3) of an STL file in its unit; InputError where the file does not hold what it declares."""
-    data = path.read_bytes()
     declared = int.from_bytes(data[80:_HEADER], "little")
     if len(data) != _HEADER + _FACET.itemsize * declared and is_text(data):
         return _read_text(path, plain_text(path, data).lower().rstrip())

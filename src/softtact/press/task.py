@@ -129,12 +129,8 @@ def refuse_unknown(options: Mapping[str, Any], known: Any) -> None:
 
 
 def mesh_of(mesh: trimesh.Trimesh | str | Path, unit: str | None) -> trimesh.Trimesh:
-    """A mesh in mm, read where it is the path of a file, which needs a `unit`."""
-    if isinstance(mesh, trimesh.Trimesh):
-        return mesh
-    if unit is None:
-        raise InputError(f"{mesh}: a mesh file does not state its unit; give unit='mm', or another one.")
-    return read_mesh(mesh, unit=unit)
+    """A mesh in mm, read where it is the path of a file, which needs a `unit` unless it states one."""
+    return mesh if isinstance(mesh, trimesh.Trimesh) else read_mesh(mesh, unit=unit)
 
 
 def motion_of(spec: "Specification", force_n: float | Sequence[float] | None, motion: Motion | str | None) -> Motion:

@@ -170,8 +170,6 @@ def _mesh_of(mesh, unit):
         return trimesh.creation.cylinder(radius=8.0, height=20.0, sections=64)
     if isinstance(mesh, trimesh.Trimesh):
         return mesh
-    if unit is None:
-        raise InputError(f"{mesh}: a mesh file does not state its unit; give unit='mm', or another one.")
     return read_mesh(mesh, unit=unit)
 
 
