@@ -16,6 +16,7 @@ ORDER = (
     ("checksums", "inputs", "kernel_files"),
     ("outputs", "compiled"),
     ("files", "drawing", "exits"),
+    ("workbooks",),
     ("tables",),
     ("linalg", "geometry", "materials"),
     ("sensors", "contact", "fem"),

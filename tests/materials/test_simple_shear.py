@@ -6,7 +6,7 @@ from law_constants import PARAMETERS
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.materials.card_making import make_card
-from softtact.materials.cards import law_from_card
+from softtact.materials.cards import law_from_card, load_card, write_card
 from softtact.materials.config import load_material
 from softtact.materials.curves import ShearCurve, synthetic_curve
 from softtact.materials.fitting import fit_law
@@ -58,10 +58,11 @@ def test_shear_does_not_tell_the_two_constants_of_mooney_and_rivlin_apart_and_sa
     assert fit_law("mooney_rivlin", [curve]).not_identifiable == ["c10", "c01"]
 
 
-def test_a_card_of_a_shear_test_knows_the_stretches_of_its_data():
+def test_a_card_of_a_shear_test_knows_the_stretches_of_its_data(tmp_path):
     curve = ShearCurve(np.linspace(0, 1.5, 31), 0.4 * np.linspace(0, 1.5, 31))
     card = make_card([curve], laws=["neo_hooke", "yeoh"], choose="neo_hooke")
-    law = law_from_card(card)
+    write_card(tmp_path / "card.json", card)
+    law = law_from_card(load_card(tmp_path / "card.json"))
     assert card["strain_window"] == {"simple_shear": [0.0, 1.5]} and law.mu0 == pytest.approx(0.4)
     assert law.stretch_window == pytest.approx((0.5, 2.0))      # l - 1/l = 1.5
     with pytest.warns(ExtrapolationWarning, match="0.5 to 2"):

@@ -10,11 +10,20 @@ from softtact.files import digest, read_json, write_json
 from softtact.materials.config import validated
 from softtact.materials.curves import principal_window
 from softtact.materials.inelastic import Inelastic
-from softtact.materials.laws.base import Law
+from softtact.materials.laws.base import SIMPLE_SHEAR, Law
 from softtact.materials.laws.registry import FOAM_LAWS, make_law
 from softtact.materials.linear import LinearConstants
 from softtact.materials.mullins import Mullins
 from softtact.materials.prony import PronySeries
+
+
+def _positive(windows):
+    if mode := next((mode for mode, (low, _) in windows.items() if mode != SIMPLE_SHEAR and low <= 0), None):
+        raise ValueError(f"the window of {mode} is of stretches or volume ratios, above 0")
+    return windows
+
+
+_Window = Annotated[list[pydantic.FiniteFloat], pydantic.Field(min_length=2, max_length=2)]
 
 
 class _CardLaw(pydantic.BaseModel):
@@ -51,7 +60,7 @@ class _Card(pydantic.BaseModel):
     kind: str
     chosen: str
     laws: dict[str, _CardLaw]
-    strain_window: dict[str, Annotated[list[pydantic.PositiveFloat], pydantic.Field(min_length=2, max_length=2)]] = {}
+    strain_window: Annotated[dict[str, _Window], pydantic.AfterValidator(_positive)] = {}
     mullins: CardMullins | None = None
     prony: CardProny | None = None
 
