@@ -107,3 +107,11 @@ def test_layers_without_frusta_are_pressed_and_twisted_too(monkeypatch):
     result = pad.result(body, steps)
     assert result.normal_force_n == pytest.approx([0.5, 0.5], rel=1e-4)
     assert abs(result.torque_nmm[0, 2]) < 1e-3 < result.torque_nmm[1, 2] * -np.sign(steps[1].loads[0, 2]) < 0.3 * 0.5 * 1.5
+    cells, spec = pad._cells_mm2, pad.sensor.spec
+    x, y = np.meshgrid(spec.map_x_mm, spec.map_y_mm)
+    np.testing.assert_allclose(np.einsum("yx,lyxi->li", cells, result.traction_mpa), result.force_n, atol=1e-9)
+    moment = np.einsum("yx,lyx->l", cells, x * result.traction_mpa[..., 1] - y * result.traction_mpa[..., 0])
+    assert moment[1] == pytest.approx(result.torque_nmm[1, 2], rel=0.03)     # at the places at rest
+    touching = np.isfinite(result.slip)
+    assert (touching == (result.traction_mpa[..., 2] < 0)).all() and 0 < touching[1].mean() < 0.2
+    assert np.nanmax(result.slip[1]) > np.nanmax(result.slip[0])

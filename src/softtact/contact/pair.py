@@ -114,7 +114,7 @@ class ContactPair:
 
     def begin_step(self, history: PairHistory, state: PairState, x: np.ndarray, at_rest: np.ndarray) -> PairHistory:
         """The history as a step begins, from a balanced state with nodes at x (n, 3): new anchors and, of segments, new points."""
-        slid = history.slid + np.linalg.norm(state.slip, axis=1) * (state.pressure > 0)
+        slid = history.slid + state.slid_mm
         traction = np.where((state.pressure > 0)[:, None], state.friction, 0.0)
         if not self.segments or self.itself:
             start = self._slip(history.points, state.projection, state.projection, x)

@@ -64,6 +64,17 @@ class PairState:
     energy: float
     """Energy in mJ of the penalties."""
 
+    @property
+    def slid_mm(self) -> np.ndarray:
+        """(p,) length of the slip within the step of the points that slide; 0 of those that stick, whose slip is the penalty's."""
+        length: np.ndarray = np.linalg.norm(self.slip, axis=1) * (self.slides & (self.pressure > 0))
+        return length
+
+    @property
+    def force_mpa(self) -> np.ndarray:
+        """(p, 3) force on the points' surface per area at rest, friction and pressure."""
+        return self.friction + self.pressure[:, None] * self.projection.normal
+
     def penetration_mm(self) -> float:
         """Deepest overlap (mm)."""
         return float(max(0.0, -np.min(self.projection.gap, initial=0.0)))

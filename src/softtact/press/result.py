@@ -112,7 +112,7 @@ class PressResult:
     Of a sensor without a plane `solid.displacement_mm` (step, node, 3)."""
     traction_mpa: np.ndarray = field(default=_ABSENT, metadata=_array("MPa", "step", "y", "x", "axis") | _PLANE | _LATER)
     """(step, y, x, 3) in MPa: the object's force on the sensing surface per area at rest, along x, y, z; z is negative where it
-    presses. Of the elastic model's presses with a motion, and of gels with a camera; else nan."""
+    presses. Of the elastic model's presses with a motion, of gels with a camera, and of the solid model; else nan."""
     slip: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
     """(step, y, x) in mm: how far the surface slid along the object since first contact; nan where it does not touch, and where
     the model has no friction."""
@@ -407,7 +407,15 @@ def _solid_of(data, geometry, thickness):
     mesh = SolidMesh(data["node_mm"].values, tuple((one.attrs["region"], one.attrs["kind"], one.values) for one in cells), faces,
                      geometry, float(thickness))
     return SolidFields(mesh=mesh, frames=tuple(map(str, data["frame"].values)), pairs=tuple(map(str, data["pair"].values)),
-                       **{one.name: data[_IN_FILE.get(one.name, one.name)].values for one in _arrays(SolidFields)})
+                       **{one.name: _stored(data, one) for one in _arrays(SolidFields)})
+
+
+def _stored(data, one):
+    """A field of solids in a file; nan in one of an earlier version that does not hold it."""
+    name = _IN_FILE.get(one.name, one.name)
+    if name not in data and one.metadata["later"]:
+        return np.full([3 if dimension == "xyz" else data.sizes[dimension] for dimension in one.metadata["dimensions"]], np.nan)
+    return data[name].values
 
 
 # --- files of solids of version 0.1 ---
@@ -415,7 +423,7 @@ def _solid_of(data, geometry, thickness):
 
 def _renewed(path, data):
     """The data set of an old file of solids with the names and numbers of today's results; missing numbers are nan."""
-    missing = [one.name for one in _arrays(SolidFields) if one.name not in data.variables]
+    missing = [one.name for one in _arrays(SolidFields) if one.name not in data.variables and not one.metadata["later"]]
     if missing:
         raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); press again.")
     steps, frames = data.sizes["step"], [str(name) for name in data["frame"].values]

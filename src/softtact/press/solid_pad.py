@@ -7,10 +7,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.sparse as sp
 import trimesh
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.pair import ContactPair
+from softtact.contact.surface_places import places
 from softtact.contact.surfaces import Surface
 from softtact.fem.elements import QUAD9
 from softtact.fem.solid_mesh import SolidMesh
@@ -36,6 +38,7 @@ _REGION = {"dielectric": "sheet", "cover": "cover"}  # names of the layers in fi
 _SHELL = "shell"  # the frame that never moves
 _ACROSS = 8  # elements across the part that a rigid object may touch, at least ...
 _MOST_PARTS = 3  # ... but at most so many in place of one
+_PARTS = 4  # along each side of the square that stands for a point of contact, as its force is given to the map
 _NEAR = 0.4  # of the layers' height: a rigid object may touch with its part up to so far above its lowest point
 
 
@@ -225,8 +228,48 @@ class SolidPad:
         made = make_result(
             self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, flags=flags, **numbers
         )
-        made = replace(made, time_s=times_of(steps))
+        made = replace(made, time_s=times_of(steps), **self._contact(body, steps))
         return replace(made, bodies=tuple(self._pressed_body(body, step) for step in steps)) if keep_body else made
+
+    def _contact(self, body: SolidBody, steps: list[SolidLoadStep]) -> dict[str, Any]:
+        """Traction and slip of the sensing surface at the map's points, by the names of a result.
+
+        The traction's sum over the map's cells is the force on them: each point of contact gives its force to the four map points
+        around it.
+        """
+        traction, slip = [], []
+        for step in steps:
+            history, state = step.state.histories[0], step.state.contacts[0]
+            touches = state.pressure > 0
+            to_map = self._shares(places(history.points, body.points)[touches], history.points.weight[touches])
+            area = np.asarray(to_map.sum(axis=1)).ravel()
+            slid = to_map @ (history.slid + state.slid_mm)[touches]
+            traction.append(to_map @ state.force_mpa[touches] / self._cells_mm2.ravel()[:, None])
+            slip.append(np.where(area > 0, slid / np.where(area > 0, area, 1.0), np.nan))
+        shape = (len(steps), *self.sensor.spec.map_shape)
+        return {"traction_mpa": np.reshape(traction, (*shape, 3)), "slip": np.reshape(slip, shape)}
+
+    @property
+    def _cells_mm2(self) -> np.ndarray:
+        """(y, x) area of each map point's cell."""
+        along = [np.convolve(np.pad(np.diff(line), 1), [0.5, 0.5], mode="valid")
+                 for line in (self.sensor.spec.map_y_mm, self.sensor.spec.map_x_mm)]
+        return np.outer(*along)
+
+    def _shares(self, at: np.ndarray, area: np.ndarray) -> sp.csr_matrix:
+        """Areas (map points, p) in mm2 of points (p, 3) with an area each, by the map points around: of a square about each."""
+        side = np.sqrt(area)[:, None, None]
+        parts = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
+        spread = np.stack(np.meshgrid(parts, parts), axis=-1).reshape(-1, 2)
+        within, (ny, nx) = (at[:, None, :2] + side * spread).reshape(-1, 2), self.sensor.spec.map_shape
+        weights, columns, point = np.repeat(area, _PARTS**2) / _PARTS**2, [], np.repeat(np.arange(len(at)), _PARTS**2)
+        for axis, line in enumerate((self.sensor.spec.map_x_mm, self.sensor.spec.map_y_mm)):
+            place = np.clip(np.interp(within[:, axis], line, np.arange(len(line))), 0, len(line) - 1 - 1e-9)
+            low = place.astype(int)
+            columns.append(((low, low + 1 - place), (low + 1, place - low)))
+        entries = [(y * nx + x, weights * wx * wy) for x, wx in columns[0] for y, wy in columns[1]]
+        rows, values = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return sp.csr_matrix((values, (rows, np.tile(point, 4))), shape=(ny * nx, len(at)))
 
     def _pressed_body(self, body: SolidBody, step: SolidLoadStep) -> PressedBody:
         """Layers and object at a load step, in the sensor's frame."""

@@ -17,9 +17,9 @@ _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 _XYZ, _RANGE = "xyz", "least_largest"
 
 
-def _array(units: str, *dimensions: str) -> Any:
-    """A field that files hold as an array; its metadata say how."""
-    return field(metadata={"units": units, "dimensions": dimensions})
+def _array(units: str, *dimensions: str, later: bool = False) -> Any:
+    """A field that files hold as an array; its metadata say how. later: files of earlier versions do not hold it."""
+    return field(metadata={"units": units, "dimensions": dimensions, "later": later})
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,10 @@ class SolidFields:
     """(s, f, 3): displacement of the frames' reference points."""
     contact_pressure_mpa: np.ndarray = _array("MPa", "step", "pair", "node")
     """(s, p, n) per area at rest, positive in compression; 0 where the surface is open, nan off the pair's surface."""
+    contact_traction_mpa: np.ndarray = _array("MPa", "step", "pair", "node", _XYZ, later=True)
+    """(s, p, n, 3): force on the pair's surface per area at rest, friction and pressure; nan as above."""
+    contact_slip_mm: np.ndarray = _array("mm", "step", "pair", "node", later=True)
+    """(s, p, n): how far the surface slid along the other one up to the step's end; nan where it does not touch it."""
     volume_ratio: np.ndarray = _array("1", "step", "node")
     """(s, n) J."""
     von_mises_mpa: np.ndarray = _array("MPa", "step", "node")
@@ -85,8 +89,9 @@ def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidFields:
     n = len(body.mesh.points)
     surfaces = [body.surface_nodes(frame.name) for frame in body.frames if frame.nodes.min() >= n]
     fields = [nodal_fields(body, step.state) for step in steps]
-    pressures = [[pressure_at_nodes(*one, n) for one in zip(body.pairs, step.state.histories, step.state.contacts, strict=True)]
-                 for step in steps]
+    contacts = [[contact_at_nodes(*one, n) for one in zip(body.pairs, step.state.histories, step.state.contacts, strict=True)]
+                for step in steps]
+    pressure, traction, slip = (np.array([[one[k] for one in step] for step in contacts]) for k in range(3))
 
     def each(value):
         return np.array([value(step) for step in steps])
@@ -95,7 +100,8 @@ def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidFields:
         mesh=body.mesh, frames=tuple(frame.name for frame in body.frames), pairs=_names(body),
         displacement_mm=each(lambda step: step.state.displacement[:n]), frame_load=each(lambda step: step.loads),
         frame_way_mm=np.array([[pose.translation for pose in step.state.poses] for step in steps]).reshape(len(steps), -1, 3),
-        contact_pressure_mpa=np.array(pressures).reshape(len(steps), -1, n),
+        contact_pressure_mpa=pressure.reshape(len(steps), -1, n), contact_slip_mm=slip.reshape(len(steps), -1, n),
+        contact_traction_mpa=traction.reshape(len(steps), -1, n, 3),
         volume_ratio=np.array([J for J, _ in fields]), von_mises_mpa=np.array([mises for _, mises in fields]),
         increments=each(lambda step: step.increments), volume_ratio_range=each(lambda step: step.volume_ratio),
         stretch_range=each(lambda step: step.stretch), work_mj=each(lambda step: step.work_mj),
@@ -149,17 +155,28 @@ def _linear(x):
     return np.column_stack([np.ones(len(x)), x])
 
 
-def pressure_at_nodes(pair: ContactPair, history: PairHistory, state: PairState, count: int) -> np.ndarray:
-    """Contact pressure of a pair in MPa, per area at rest, at `count` nodes: 0 where its surface is open, nan off the surface.
+def contact_at_nodes(pair: ContactPair, history: PairHistory, state: PairState, count: int
+                     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pressure (n,) and force (n, 3) on a pair's surface per area at rest in MPa, and slip (n,) in mm, at `count` nodes.
 
-    A node has the mean of the points around it, by their areas and its shape function at them.
+    Pressure and force are 0 where the surface is open and nan off it; slip is nan where nothing touches. A node has the mean of the
+    points around it, by their areas and its shape function at them.
     """
+    touches = state.pressure > 0
+    slid = (history.slid + state.slid_mm) * touches
+    mean = _mean_at_nodes(pair, history, np.column_stack([state.pressure, state.force_mpa, slid, touches]), count)
+    touching = np.where(mean[:, 5] > 0, mean[:, 5], np.nan)
+    return mean[:, 0], mean[:, 1:4], mean[:, 4] / touching
+
+
+def _mean_at_nodes(pair, history, values, count):
+    """Means (n, k) of values (p, k) at the points around each of `count` nodes; nan off the pair's surface."""
     points = history.points
     there = points.nodes >= 0
     weight = np.where(there, np.abs(points.values[:, :points.nodes.shape[1]]), 0.0) * points.weight[:, None]
     total = np.bincount(points.nodes[there], weight[there], count)
-    sums = np.bincount(points.nodes[there], (weight * state.pressure[:, None])[there], count)
-    out = np.full(count, np.nan)
+    sums = np.column_stack([np.bincount(points.nodes[there], (weight * column[:, None])[there], count) for column in values.T])
+    out = np.full((count, values.shape[1]), np.nan)
     on = pair.surface.used[pair.surface.used < count]
-    out[on] = sums[on] / np.where(total[on] > 0, total[on], 1.0)
+    out[on] = sums[on] / np.where(total[on] > 0, total[on], 1.0)[:, None]
     return out
