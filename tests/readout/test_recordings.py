@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from softtact.errors import InputError
-from softtact.readout.recording import clipped, dead, findings, make_recording, with_force
+from softtact.readout.checks.recording import check_recording
+from softtact.readout.recording import clipped, dead, make_recording, with_force
 from softtact.readout.tsf85 import read_recording, write_recording
 
 SHAPE = (2, 7, 4)
@@ -114,10 +115,12 @@ def test_clipped_and_dead_taxels_are_named_by_row(tmp_path):
     counts[3:, 0, 3, 1] = 65535 - BASE[0, 3, 1]
     write_recording(tmp_path / "r.csv", make_recording(TIME, counts, source="x", baseline=BASE))
     one = read_recording(tmp_path / "r.csv", baseline="subtracted")
-    assert clipped(one).sum() == 2 and dead(one).sum() == 27 + 27
-    said = findings(one)
+    beside = [8, 9, 10, 12, 14, 16, 17, 18]
+    assert clipped(one).sum() == 2 and np.flatnonzero(dead(one)[0]).tolist() == beside
+    assert np.flatnonzero(dead(one)[1]).tolist() == [1, 3, 5, 6, 7]
+    said = [found.sentence for found in check_recording(one)]
     assert "r.csv, row 6: finger 0, taxel 13 (row 3, column 1) reads 56522 counts, the end of its range; 2 readings" in said[0]
-    assert "finger 0, taxel 0 (row 0, column 0) reads 0 counts in all 5 readings while others" in said[1]
+    assert "finger 0, taxel 8 (row 2, column 0) reads 0 counts in all 5 readings while others" in said[1]
 
 
 def test_a_readouts_own_end_clips_only_where_the_recording_does_not_exceed_it():
@@ -126,7 +129,7 @@ def test_a_readouts_own_end_clips_only_where_the_recording_does_not_exceed_it():
 
 def test_a_finger_that_nothing_presses_has_no_dead_taxel():
     still = make_recording(TIME, np.zeros((5, *SHAPE), dtype=int), source="x")
-    assert not dead(still).any() and findings(still) == []
+    assert not dead(still).any() and check_recording(still) == []
 
 
 @pytest.mark.parametrize(("change", "sentence"), [

@@ -130,9 +130,11 @@ def _place(text):
 
 
 def _experiment(path, mesh, force, place, options, spec):
-    """The `Experiment` of a recording, and sentences on clipped or dead taxels."""
+    """The `Experiment` of a recording, and sentences on its faults."""
     from softtact.calibration.experiment import experiment
-    from softtact.readout.recording import findings, with_force
+    from softtact.readout.checks.finding import left_out, refuse_unsafe, zeroed
+    from softtact.readout.checks.recording import check_recording
+    from softtact.readout.recording import with_force
     from softtact.readout.tsf85 import read_recording
 
     recording = read_recording(path, baseline=options.baseline)
@@ -141,14 +143,18 @@ def _experiment(path, mesh, force, place, options, spec):
     held = float(force) if _is_number(force) else None
     if held is None:
         recording = with_force(recording, force)
+    found = [one for one in check_recording(recording, largest=spec.largest_counts) if options.finger in one.fingers]
+    refuse_unsafe(found)
+    if held is None:
+        recording = zeroed(recording, found)
     top = spec.force_range_n[1]
     largest = held if held is not None else float(recording.force_n.max())
     if not 0 < largest <= top:
         raise InputError(f"--force {force}: its largest force is {largest:g} N, and the sensor {spec.name} bears up to {top:g} N; "
                          "is it in grams or another unit? Give it in newtons.")
-    notes = [one for one in findings(recording, largest=spec.largest_counts) if f"finger {options.finger}," in one]
-    made = experiment(recording, mesh, finger=options.finger, force_n=held, place=place, largest_counts=spec.largest_counts)
-    return made, notes
+    made = experiment(recording, mesh, finger=options.finger, force_n=held, place=place, largest_counts=spec.largest_counts,
+                      left_out=left_out(recording, found))
+    return made, [one.sentence for one in found]
 
 
 def _notes(problem, checks):

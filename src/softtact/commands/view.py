@@ -65,7 +65,9 @@ def _view(options):
 
 def _view_recording(options):
     """Draw a recording as a strip of pictures, a GIF or an MP4."""
-    from softtact.readout.recording import findings, with_force
+    from softtact.readout.checks.finding import left_out
+    from softtact.readout.checks.recording import check_recording
+    from softtact.readout.recording import with_force
     from softtact.readout.tsf85 import read_recording
     from softtact.reporting.recording_view import save_strip, save_video
 
@@ -78,12 +80,15 @@ def _view_recording(options):
         raise InputError(f"{options.result}: it has nodes of a simulation but no counts; give the file of its readings.")
     if options.force_log:
         recording = with_force(recording, options.force_log)
-    found = findings(recording)
+    checked = check_recording(recording)
+    found = [one.sentence for one in checked]
     for sentence in found:
         print(f"softtact view: {sentence}", file=sys.stderr)
-    (save_strip if picture.suffix.lower() == ".png" else save_video)(recording, picture)
+    wrong = left_out(recording, [one for one in checked if one.check == "wrong reading"])
+    shown = recording.assign(counts=recording.counts.where(~wrong)) if wrong.any() else recording
+    (save_strip if picture.suffix.lower() == ".png" else save_video)(shown, picture)
     result = {"picture": str(picture), "readings": len(recording.time), "seconds": float(recording.time[-1] - recording.time[0]),
-              "largest_counts": float(recording.counts.max()), "findings": found}
+              "largest_counts": float(shown.counts.max()), "findings": found}
     show(result, as_json=options.json, lines=[
         f"{result['readings']} readings in {result['seconds']:.3g} s, up to {result['largest_counts']:g} counts",
         f"written: {picture}"])

@@ -17,7 +17,17 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path
-from softtact.readout.recording import AXES, COLUMNS, FINGERS, LARGEST_RAW, ROWS, TAXELS, make_recording, refuse_running_back
+from softtact.readout.recording import (
+    AXES,
+    COLUMNS,
+    FINGERS,
+    LARGEST_RAW,
+    ROWS,
+    TAXELS,
+    make_recording,
+    running_forward,
+    taxel_in_words,
+)
 from softtact.tables import Table, read_table
 
 if TYPE_CHECKING:
@@ -28,6 +38,7 @@ RECORDER = "recorder of the TSF-85"       # source of its recordings
 BASELINES = ("auto", "subtracted", "kept")
 _STATIC = re.compile(r"S(\d+)_(\d+)")
 _LOW = 0.02             # share of a taxel's readings that is taken for readings at rest, wherever they are in the recording
+_FEW = 0.01             # share of the frames that may hold impossible readings: these are faults, not another form of the file
 _CLEARLY = 0.5          # largest ratio of the distances from the two forms of baseline for a clear decision
 _BASELINE_MISSING = "the baseline is missing: put the recorder's first row back, or record again."
 _NODES = (25, 16)       # of the extension's mesh, rows along the longer side: assumed, as their order is documented nowhere
@@ -117,15 +128,14 @@ def _of_recorder(path, table, baseline):
     columns = dict(zip(table.header, np.array(table.numbers(table.header)), strict=True))
     rows = np.array([row for row, _ in table.rows])
     _check_values(path, columns, rows)
-    base, counts = _baseline_off(path, columns, baseline, rows)
-    time = columns[TIME][1:]
-    refuse_running_back(path, time, rows[1:].tolist(), unit="ms")
+    base, counts, repairs = _baseline_off(path, columns, baseline, rows)
+    time, of_clock = running_forward(path, columns[TIME][1:], rows[1:].tolist(), unit="ms")
     others = {name: np.stack([columns[one][1:] for one in group], axis=1).astype(int)
               for name, group in _optional().items() if group[0] in columns}
     shape = (len(time), FINGERS, len(AXES))
     others = {name: values if name == "dynamic" else values.reshape(shape) for name, values in others.items()}
     return make_recording(1e-3 * (time - time[0]), counts, baseline=base, row_of_file=rows[1:], start_ms=int(time[0]),
-                          source=RECORDER, file=str(path), **others)
+                          source=RECORDER, file=str(path), repairs=[*repairs, *of_clock], **others)
 
 
 def _optional():
@@ -173,7 +183,7 @@ def _check_values(path, columns, rows):
 
 
 def _baseline_off(path, columns, baseline, rows):
-    """(baseline (finger, row, column), counts over it (time, finger, row, column)), both whole."""
+    """Baseline (finger, row, column), whole counts over it (time, finger, row, column), and sentences on what was put right."""
     placeholders = [name for group in _optional().values() for name in group if name in columns]
     if any(columns[name][0] for name in placeholders):
         name = next(name for name in placeholders if columns[name][0])
@@ -184,24 +194,48 @@ def _baseline_off(path, columns, baseline, rows):
     if base.min() < 0:
         raise InputError(f"{path}, row {rows[0]}: its baseline has {base.min()} counts, and raw counts are not negative; "
                          f"{_BASELINE_MISSING}")
+    signed = _with_signs(base, readings) if baseline != "kept" else readings
     if baseline == "auto":
-        baseline = _form_of_baseline(path, base, readings)
-    counts = readings - base if baseline == "kept" else readings
-    raw = counts + base
-    if raw.min() < 0 or raw.max() > LARGEST_RAW:
-        at = int(np.argmax((raw < 0).any(axis=(1, 2, 3)) | (raw > LARGEST_RAW).any(axis=(1, 2, 3))))
+        baseline = _form_of_baseline(path, base, readings, signed)
+    counts = readings - base if baseline == "kept" else signed
+    _refuse_other_form(path, base, counts, baseline, rows[1:])
+    if baseline == "kept" or signed is readings:
+        return base, counts, []
+    first, *taxel = np.argwhere(signed != readings)[0]
+    return base, counts, [f"{path}, row {rows[1 + first]}: {taxel_in_words(*map(int, taxel))} reads {readings[first, *taxel]}, and "
+                          f"{(signed != readings).sum() - 1} other readings lie as high: negative ones without their sign; they "
+                          "are read as such, 65536 less."]
+
+
+def _with_signs(base, readings):
+    """Readings of which some are negative but written without a sign, with it; the same array where none is.
+
+    Such readings cannot be raw counts over the baseline, they are no few, and no reading has a sign.
+    """
+    high = readings > LARGEST_RAW // 2
+    beyond = high & (readings + base > LARGEST_RAW)
+    signed = np.where(high, readings - (LARGEST_RAW + 1), readings)
+    unsigned = readings.min() >= 0 and beyond.any(axis=(1, 2, 3)).mean() > _FEW and (signed + base).min() >= 0
+    return signed if unsigned else readings
+
+
+def _refuse_other_form(path, base, counts, baseline, rows):
+    """Refuse counts that 16 bits do not hold together with the baseline; a few are wrong readings, which the checks name."""
+    beyond = (counts + base < 0) | (counts + base > LARGEST_RAW)
+    frames = beyond.any(axis=(1, 2, 3))
+    if frames.mean() > _FEW:
         other = "subtracted" if baseline == "kept" else "kept"
-        raise InputError(f"{path}, row {rows[1 + at]}: with the baseline {baseline} a taxel's raw counts are not within 0 and "
-                         f"{LARGEST_RAW}; is the baseline {other} (--baseline {other})?")
-    return base, counts
+        raise InputError(f"{path}, row {rows[int(np.argmax(frames))]}: with the baseline {baseline} a taxel's raw counts are not "
+                         f"within 0 and {LARGEST_RAW}; is the baseline {other} (--baseline {other})?")
 
 
-def _form_of_baseline(path, base, readings):
+def _form_of_baseline(path, base, readings, signed):
     """Whether the baseline is subtracted from the readings or kept in them, by their lowest values."""
-    if readings.min() < 0 or not base.any():
+    if not base.any():
         return "subtracted"
-    low = np.quantile(readings, _LOW, axis=0)
-    off, on = (float(np.sqrt(np.mean(values**2))) for values in (low, low - base))
+    off, on = (float(np.sqrt(np.mean(np.quantile(values, _LOW, axis=0)**2))) for values in (signed, readings - base))
+    if readings.min() < 0 and off < on:
+        return "subtracted"
     if min(off, on) > _CLEARLY * max(off, on):
         raise InputError(f"{path}: whether the baseline is subtracted from its readings is not clear, as the lowest are {off:.0f} "
                          f"counts from 0 and {on:.0f} from the baseline; state it (`baseline`, --baseline: subtracted, or kept).")
@@ -219,11 +253,11 @@ def _of_extension(path: Path, table: Table) -> "xarray.Dataset":
         raise InputError(f"{path}: it has a header and no reading; record again.")
     time = np.array(table.numbers(["time_sec"])[0])
     rows = np.array([row for row, _ in table.rows])
-    refuse_running_back(path, time, rows.tolist(), unit="s")
+    time, repairs = running_forward(path, time, rows.tolist(), unit="s")
     values = np.array(table.numbers([f"{kind}_{k}" for k in range(count)])).T
     source = "extension of the paper's authors, a network's reading"
     counts = values.reshape(-1, 1, ROWS, COLUMNS) if kind == "pred" else np.zeros((len(time), 1, ROWS, COLUMNS), dtype=int)
-    recording = make_recording(time, counts, row_of_file=rows, source=source, file=str(path))
+    recording = make_recording(time, counts, row_of_file=rows, source=source, file=str(path), repairs=repairs)
     if kind == "pred":
         return recording
     nodes = (("time", "node_y", "node_x"), values.reshape(-1, *_NODES), {"units": "as the extension writes it"})

@@ -26,7 +26,7 @@ def save_strip(recording: "xarray.Dataset", path: str | Path) -> None:
 def draw_strip(recording: "xarray.Dataset") -> "Figure":
     """The figure of `save_strip`, at the time of the largest sum of counts and five times spread evenly over the recording."""
     time, counts = recording.time.values, recording.counts.values
-    peak = int(np.abs(counts).sum(axis=(2, 3)).max(axis=1).argmax())
+    peak = int(np.nansum(np.abs(counts), axis=(2, 3)).max(axis=1).argmax())
     shown = sorted({peak, *(int(np.abs(time - at).argmin()) for at in np.linspace(time[0], time[-1], _FRAMES))})
     fingers = counts.shape[1]
     figure = pyplot().figure(figsize=(1.4 * len(shown) + 1.6, 2.2 + 2.3 * fingers), layout="constrained")
@@ -78,7 +78,7 @@ def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
 
 
 def _limits(counts):
-    return min(0.0, float(counts.min())), max(float(counts.max()), 1.0)
+    return min(0.0, float(np.nanmin(counts))), max(float(np.nanmax(counts)), 1.0)
 
 
 def _label(recording, reading):

@@ -12,8 +12,10 @@ import xarray
 from softtact.errors import InputError
 from softtact.files import write_dataset
 from softtact.progress import announce
+from softtact.readout.checks.finding import left_out, refuse_unsafe, zeroed
+from softtact.readout.checks.recording import check_recording
 from softtact.readout.recorded_press import SOURCE, RecordedPress, readings_at
-from softtact.readout.recording import COLUMNS, dead, with_force
+from softtact.readout.recording import with_force
 from softtact.readout.tsf85 import RECORDER, read_recording
 from softtact.sensors.specification import SensorSpec
 
@@ -44,13 +46,18 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def _read(path: "Path", log: "Path", forces: list[float], *, finger: int, baseline: str, largest_counts: float) -> RecordedPress:
-    """One recording at the forces. Raises InputError for a simulated recording."""
+    """One recording at the forces. Raises InputError for a simulated recording, and for faults that are not safe.
+
+    Frames with readings that are left out are not used; taxels that are dead are, and clipped ones are refused where they matter.
+    """
     recording = read_recording(path, baseline=baseline)
     if recording.attrs["source"] != RECORDER:
         raise InputError(f"{path}: its source is the {recording.attrs['source']}, not a real sensor; give a file of the TSF-85's "
                          "recorder.")
-    still = [str(row * COLUMNS + column) for row, column in np.argwhere(dead(recording)[finger])]
-    if still:
-        announce(f"{path}: taxel {', '.join(still)} of finger {finger} never changes while others do; it may be dead, and is used "
-                 "as recorded.")
-    return readings_at(with_force(recording, log), forces, finger=finger, largest_counts=largest_counts)
+    recording = with_force(recording, log)
+    found = [one for one in check_recording(recording, largest=largest_counts) if finger in one.fingers]
+    refuse_unsafe(found)
+    for one in found:
+        announce(one.sentence)
+    faulty = left_out(recording, [one for one in found if one.check not in ("dead", "clipped")])[:, finger].any(axis=(1, 2))
+    return readings_at(zeroed(recording, found).isel(time=~faulty), forces, finger=finger, largest_counts=largest_counts)
