@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from softtact.errors import SofttactError
+from softtact.fem.mesh_files import read_body
 from softtact.geometry.repair import read_mended
 from softtact.learning.network import load_network
 from softtact.learning.prediction import read_maps
@@ -24,6 +25,7 @@ from softtact.reporting.press_view import read_view
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 from softtact.studies.hybrid.config import load_study
+from tests.support.element_files import block, hexahedra, inp_assembly, inp_part, msh22, msh41
 
 ROOT = Path(__file__).resolve().parents[1]
 BOX = trimesh.creation.box(extents=(4, 5, 6))
@@ -38,6 +40,12 @@ def saved_array(array):
     file = io.BytesIO()
     np.save(file, array, allow_pickle=True)
     return file.getvalue()
+
+
+def block_of_gmsh(new=False):
+    """Nodes, elements and names of a block for `msh41` or `msh22`."""
+    nodes, cells = block()
+    return nodes, [(3, 1, [1], 4, cells)] if new else [(4, 1, 1, cells)], [(3, 1, "gel")]
 
 
 quick = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -120,6 +128,30 @@ def test_a_mesh_cut_off_anywhere_is_refused_by_name_or_whole(kind, tmp_path):
         mended = reader()
         assert mended is None or mended.mesh.volume == pytest.approx(120)
     assert reader.refused > 0.8 * len(content) / 7
+
+
+ELEMENTS = {
+    "deck.inp": (inp_part("A", *hexahedra(1)) + inp_assembly(
+        {"A-1": ("A", "0, 0, 1\n0, 0, 0, 0, 0, 1, 30.\n"), "A-2": ("A", "9, 0, 0\n")},
+        "*ELSET, ELSET=SOME, INSTANCE=A-1, GENERATE\n1, 1\n*SURFACE, NAME=TOP\nSOME, S2\n")).encode(),
+    "old.msh": msh22(*block_of_gmsh()), "old_binary.msh": msh22(*block_of_gmsh(), binary=True),
+    "new.msh": msh41(*block_of_gmsh(new=True)), "new_binary.msh": msh41(*block_of_gmsh(new=True), binary=True)}
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_damaged_elements_are_refused_by_name_or_read_as_a_body(name, tmp_path):
+    path = tmp_path / name
+    reader = Reader(lambda: read_body(path, unit="mm"), named=path.name)
+
+    @quick
+    @given(damaged(ELEMENTS[name]))
+    def damage(data):
+        path.write_bytes(data)
+        body = reader()
+        assert body is None or body.mesh.volume_mm3() > 0
+
+    damage()
+    assert reader.refused >= 10 and reader.taken > 0
 
 
 @pytest.mark.parametrize(("name", "content", "read"), [

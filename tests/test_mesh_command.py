@@ -11,6 +11,7 @@ import trimesh
 
 from softtact.cli import main
 from softtact.fem.mesh_files import read_mesh_file
+from tests.support.element_files import hexahedra, inp_assembly, inp_part
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
 
@@ -56,6 +57,20 @@ def test_elements_of_another_program_become_a_body(tmp_path, capsys):
     assert main(["mesh", str(tmp_path / "one.vtk"), "--unit", "cm", "--face", "floor=z<0.1", "--out", str(written)]) == 0
     assert read_mesh_file(written).volume_mm3() == pytest.approx(1000 / 6)
     assert "floor" in capsys.readouterr().out
+
+
+def test_pieces_and_what_is_left_out_are_reported(tmp_path, capsys):
+    nodes, hexes = hexahedra(1)
+    (tmp_path / "two.inp").write_text(inp_part("A", nodes, hexes) + inp_assembly({"A-1": ("A", ""), "A-2": ("A", "0, 0, 4\n")},
+                                                                              "*STEP\n"))
+    written = tmp_path / "two.vtu"
+    assert main(["mesh", str(tmp_path / "two.inp"), "--unit", "mm", "--json", "--out", str(written)]) == 0
+    shown = capsys.readouterr()
+    result = json.loads(shown.out)
+    assert (result["pieces"], result["regions"], len(result["remarks"])) == (2, ["EA"], 3)
+    for remark in ("*STEP", "in 2 pieces that share no node", "touch at"):
+        assert remark in shown.err
+    assert read_mesh_file(written).volume_mm3() == pytest.approx(128)
 
 
 def test_what_it_cannot_use_is_refused_in_one_sentence_and_nothing_is_written(box, tmp_path, capsys):

@@ -69,6 +69,10 @@ class FrameWarning(UserWarning):
     """A camera frame may not meet the assumptions of the detection of discs."""
 
 
+class MeshWarning(UserWarning):
+    """A mesh of elements was read, and not all of its file is in it, or its pieces do not hang together."""
+
+
 def missing_extra(error: ImportError) -> str | None:
     """One sentence that says which extra to install for the package that an import did not find; None for any other package."""
     package = (error.name or "").partition(".")[0]

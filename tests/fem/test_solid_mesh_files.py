@@ -54,6 +54,7 @@ def test_neighbours_share_the_nodes_in_their_middles():
     assert np.allclose(points[nodes[:, 4]], points[nodes[:, :2]].mean(axis=1))
 
 
+@pytest.mark.filterwarnings("ignore::softtact.errors.MeshWarning")     # of the set that is no region
 def test_sets_of_abaqus_and_groups_of_gmsh_name_regions_and_faces(tmp_path):
     bottom = np.array([[0, 1, 3], [1, 2, 3]])
     cells, soft, hard = [("tetra", TETRAHEDRA), ("triangle", bottom)], np.array([0, 2]), np.array([1, 3, 4])

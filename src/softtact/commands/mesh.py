@@ -90,9 +90,12 @@ def _mesh(options):
     rules = dict(pairs("--face", options.face))
     mesh, result = _filled(options, rules) if options.mesh.suffix.lower() in SURFACES else _taken(options, rules)
     write_mesh(mesh, options.out)
+    for remark in result["remarks"]:
+        print(f"softtact mesh: {options.mesh}: {remark}", file=sys.stderr)
     result = {"mesh": str(options.out)} | result | {"regions": mesh.regions, "faces": {name: sum(map(len, facets.values()))
                                                                                       for name, facets in mesh.faces.items()}}
-    shown = {name.replace("_", " "): short(value) for name, value in result.items() if name != "mesh" and value not in ([], {})}
+    shown = {name.replace("_", " "): short(value) for name, value in result.items()
+             if name not in ("mesh", "remarks") and value not in ([], {})}
     lines = [f"{name}: {value}" for name, value in shown.items()]
     show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])
 
@@ -121,19 +124,21 @@ def _filled(options, rules):
     mesh = mesh_body(surface, size_mm=options.size, region=(options.region or ["body"])[0], envelope_mm=options.envelope,
                      most_elements=MOST_ELEMENTS if options.most_elements is None else options.most_elements)
     seconds = time.perf_counter() - began
-    return with_named_faces(mesh, rules), body_report(mesh, surface).as_dict() | {"meshing_s": seconds, "repairs": repairs}
+    return with_named_faces(mesh, rules), body_report(mesh, surface).as_dict() | {"meshing_s": seconds, "repairs": repairs,
+                                                                                            "remarks": []}
 
 
 def _taken(options, rules):
     """The mesh of a file of elements, and the values to report."""
-    from softtact.fem.mesh_files import read_mesh_file
+    from softtact.fem.mesh_files import read_body
 
     for name in ("size", "envelope", "most_elements"):
         if getattr(options, name) is not None:
             raise InputError(f"--{name.replace('_', '-')}: {options.mesh} has elements already; leave the option out, or give a "
                              "surface (STL, OBJ, STEP, ...).")
-    mesh = read_mesh_file(options.mesh, unit=options.unit, geometry=options.geometry, faces=rules,
-                          regions=options.region)
+    body = read_body(options.mesh, unit=options.unit, geometry=options.geometry, faces=rules, regions=options.region)
+    mesh = body.mesh
     axes = 3 if mesh.geometry == "solid" else 2
     return mesh, {"elements": sum(len(nodes) for _, _, nodes in mesh.cells), "nodes": len(mesh.points),
-                  "unknowns": axes * len(mesh.points), "geometry": mesh.geometry, "volume_mm3": mesh.volume_mm3()}
+                  "unknowns": axes * len(mesh.points), "geometry": mesh.geometry, "volume_mm3": mesh.volume_mm3(),
+                  "pieces": body.pieces, "remarks": body.remarks}

@@ -1,42 +1,39 @@
-"""Meshes of solids in files: VTU with regions and faces by name, and any mesh format that meshio reads.
+"""Meshes of solids in files: VTU with regions and faces by name, and files of elements of other programs.
 
 In softtact's VTU files each region is a cell array `region:NAME`, each face a cell array `face:NAME`: 1 on the cells that belong to
 it, 0 on the others. The facets of faces are additional cells. `geometry:KIND` holds the thickness in mm.
-In other formats regions and faces are the named cell sets (Abaqus) or the physical groups (Gmsh). Cells of the highest dimension
-are elements, those of one dimension less name faces. Linear elements are converted to quadratic ones.
+In other formats regions and faces are the named sets (Abaqus) or the physical groups (Gmsh), or the numbers of materials. Cells of
+the highest dimension are elements, those of one dimension less name faces. Linear elements are converted to quadratic ones.
 Faces can also be defined by rules such as `z<0.1` or `x>-3 & x<3 & z>2` for the centres of the outer facets in mm.
 """
 
 import base64
-import contextlib
-import io
 import re
 import struct
+import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.checksums import check
-from softtact.errors import InputError
+from softtact.errors import InputError, MeshWarning
+from softtact.fem.abaqus_files import read_abaqus
+from softtact.fem.gmsh_files import read_gmsh
+from softtact.fem.mesh_checks import refuse_faulty, remarks_on_pieces
+from softtact.fem.meshio_files import FACE, GEOMETRY, REGION, read_other
 from softtact.fem.quadratic_nodes import QUADRATIC, raised
-from softtact.fem.solid_mesh import ELEMENTS, FACETS, SolidMesh
+from softtact.fem.raw_mesh import FACET_CORNERS, RawMesh, corners_of
+from softtact.fem.solid_mesh import ELEMENTS, SolidMesh
 from softtact.files import atomic_path
 from softtact.geometry.meshes import UNIT_MM
 from softtact.inputs import check_input, check_limit
 
-if TYPE_CHECKING:
-    import meshio
-
-_REGION, _FACE, _GEOMETRY = "region:", "face:", "geometry:"
-_FACET_CORNERS = {"line": 2, "triangle": 3, "quad": 4} | {kind: element.corners for kind, element in FACETS.items()}
-_DIMENSION = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3}
 _PACKED = re.compile(rb"<VTKFile[^>]* compressor=[^>]*>")
 _INLINE = re.compile(rb'<DataArray[^>]* format="binary"[^>]*>\s*([\w+/]{16,32})')
 _APPENDED = re.compile(rb'<DataArray[^>]* offset="(\d{1,15})"')
 _TURNED_WEDGE = [3, 4, 5, 0, 1, 2]
-_EMPTY = ("meshio", "gmsh:", "medit", "avsucd")     # beginnings of names that programs give by themselves
 _TERM = re.compile(r"\s*([xyz])\s*([<>])\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
 
@@ -50,11 +47,11 @@ def write_mesh(mesh: SolidMesh, path: str | Path, point_data: Mapping[str, np.nd
     facets, of_face = _all_facets(mesh)
     blocks = [(kind, nodes[:, ELEMENTS[kind].vtk_order]) for _, kind, nodes in mesh.cells] + list(facets.items())
     elements = len(mesh.cells)
-    flags = {_REGION + name: [np.full(len(nodes), int(k < elements and mesh.cells[k][0] == name), np.int8)
+    flags = {REGION + name: [np.full(len(nodes), int(k < elements and mesh.cells[k][0] == name), np.int8)
                               for k, (_, nodes) in enumerate(blocks)] for name in mesh.regions}
-    flags |= {_FACE + name: [of_face[name][kind] if k >= elements and kind in of_face[name] else np.zeros(len(nodes), np.int8)
+    flags |= {FACE + name: [of_face[name][kind] if k >= elements and kind in of_face[name] else np.zeros(len(nodes), np.int8)
                              for k, (kind, nodes) in enumerate(blocks)] for name in mesh.faces}
-    flags[_GEOMETRY + mesh.geometry] = [np.full(len(nodes), mesh.thickness_mm) for _, nodes in blocks]
+    flags[GEOMETRY + mesh.geometry] = [np.full(len(nodes), mesh.thickness_mm) for _, nodes in blocks]
     with atomic_path(path) as temporary:
         meshio.Mesh(mesh.points, blocks, point_data=dict(point_data or {}), cell_data=flags).write(temporary, file_format="vtu")
 
@@ -78,59 +75,75 @@ def _all_facets(mesh):
 
 def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str | None = None, thickness_mm: float = 1.0,
                    faces: Mapping[str, str] | None = None, regions: Sequence[str] | None = None) -> SolidMesh:
-    """The `SolidMesh` of a file: VTU written by `write_mesh`, or any format that meshio reads (Gmsh, Abaqus, VTK, MED, ...).
+    """The `SolidMesh` of a file: VTU written by `write_mesh`, or another format (Gmsh, Abaqus, VTK, MED, ...).
 
     unit: mm, cm, m, inch or in; required except for files of softtact, which are in mm
     geometry, thickness_mm: plane_strain or axisymmetric, for a mesh in the plane z = 0 whose file does not state it
     faces {name: rule}: further faces, see `face_rule`;  regions: the file's element sets or groups that are regions, if it has
         other sets too
 
+    Warns (MeshWarning) of what is left out of the file of another program, and of pieces that are not joined.
     Raises InputError that names the file and the problem: unreadable file, unsupported element type, mixed linear and
-    quadratic elements, inverted elements, an element in no region or in two, a facet of a face inside the body.
+    quadratic elements, inverted or repeated elements, neighbours whose faces do not match, an element in no region or in two, a
+    facet of a face inside the body.
     """
+    body = read_body(path, unit=unit, geometry=geometry, thickness_mm=thickness_mm, faces=faces, regions=regions)
+    for remark in body.remarks if not body.in_mm else ():
+        warnings.warn(f"{path}: {remark}.", MeshWarning, stacklevel=2)
+    return body.mesh
+
+
+@dataclass(frozen=True)
+class BodyInFile:
+    """What was read of a file of elements."""
+
+    mesh: SolidMesh
+    pieces: int
+    """Parts that share no node with each other."""
+    remarks: list[str]
+    """What was left out, and pieces that touch or overlap, in sentences without a full stop."""
+    in_mm: bool
+    """Whether softtact wrote the file."""
+
+
+def read_body(path: str | Path, *, unit: str | None = None, geometry: str | None = None, thickness_mm: float = 1.0,
+              faces: Mapping[str, str] | None = None, regions: Sequence[str] | None = None) -> BodyInFile:
+    """As `read_mesh_file`, with what there is to say about the file in place of warnings."""
     path = Path(path)
-    read = _read(path)
-    of_softtact = any(name.startswith(_REGION) for name in read.cell_data)
-    if unit is not None and unit not in UNIT_MM or unit is None and not of_softtact:
+    raw = _read(path)
+    if unit is not None and unit not in UNIT_MM or unit is None and not raw.in_mm:
         stated = "no unit is stated, and the file has none" if unit is None else f"the unit {unit!r} is not known"
         raise InputError(f"{path}: {stated}; state one of {', '.join(UNIT_MM)}.")
-    dimensions = [_dimension(block.type) for block in read.cells]
-    d = max(dimensions, default=0)
+    raw.points = raw.points * UNIT_MM[unit or "mm"]
+    d = max(raw.dimensions, default=0)
     if d < 2:
         raise InputError(f"{path}: it holds no elements such as tetrahedra, hexahedra or triangles; mesh the body.")
-    points = np.zeros((len(read.points), 3))
-    points[:, :read.points.shape[1]] = read.points * UNIT_MM[unit or "mm"]
-    sets = _sets(read)
-    elements = [k for k, dimension in enumerate(dimensions) if dimension == d]
-    cells = [(read.cells[k].type, np.asarray(read.cells[k].data, dtype=np.int64)) for k in elements]
-    named = _region_names(path, sets, elements, regions)
-    of_elements = [_regions_of(path, {name: sets[name][k] for name in named}, len(nodes))
-                   for k, (_, nodes) in zip(elements, cells, strict=True)]
-    points, cells, number = _quadratic(path, points, cells)
-    kind, thickness = _geometry(path, read, geometry, thickness_mm, d, points)
+    elements = [k for k, (_, nodes) in enumerate(raw.blocks) if raw.dimensions[k] == d and len(nodes)]
+    _refuse_strange_nodes(path, raw, elements)
+    cells = [raw.blocks[k] for k in elements]
+    named = _region_names(path, raw, regions)
+    of_elements = [_regions_of(path, raw, {name: raw.regions[name][k] for name in named}, k) for k in elements]
+    points, cells, number = _quadratic(path, raw.points, cells)
+    kind, thickness = _geometry(path, raw, geometry, thickness_mm, d, points)
     parts = tuple((name, type_, nodes[region == name]) for (type_, nodes), region in zip(cells, of_elements, strict=True)
                   for name in dict.fromkeys(region))
     mesh = SolidMesh(points, parts, geometry=kind, thickness_mm=thickness)
-    _refuse_inverted(path, mesh)
-    facets = [(k, np.asarray(read.cells[k].data)) for k, dimension in enumerate(dimensions) if dimension == d - 1]
-    corners_of = {name: [number[nodes[flags[k]][:, :_FACET_CORNERS[read.cells[k].type]]] for k, nodes in facets if flags[k].any()]
-                  for name, flags in sets.items()}
-    named_faces = {name: _face(path, mesh, name, corners) for name, corners in corners_of.items() if corners}
+    refuse_faulty(path, mesh)
+    named_faces, remarks = _faces(path, raw, mesh, number, d)
     mesh = SolidMesh(points, parts, named_faces, kind, thickness)
-    return with_named_faces(mesh, faces or {})
+    pieces, of_pieces = remarks_on_pieces(mesh)
+    left_out = _left_out(raw, d, [name for name in raw.regions if named and name not in named])
+    return BodyInFile(with_named_faces(mesh, faces or {}), pieces, [*raw.remarks, *left_out, *remarks, *of_pieces], raw.in_mm)
 
 
-def _read(path: Path) -> "meshio.Mesh":
-    import meshio
-
+def _read(path: Path) -> RawMesh:
+    """A file in the reader of its format."""
     check_mesh_file(path)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):     # meshio prints errors itself
-            return meshio.read(path)
-    except (Exception, SystemExit) as error:     # meshio's readers fail in many ways, and end the program for an unknown format
-        known = "give VTU, or another volume mesh that meshio reads, such as Gmsh or Abaqus"
-        problem = " ".join(str(error).split())[:120] or type(error).__name__
-        raise InputError(f"{path}: not readable as a mesh of elements ({problem}); {known}.") from None
+    if path.suffix.lower() == ".inp":
+        return read_abaqus(path)
+    with path.open("rb") as file:
+        of_gmsh = file.read(200).lstrip().startswith(b"$MeshFormat")
+    return read_gmsh(path) if of_gmsh else read_other(path)
 
 
 def check_mesh_file(path: str | Path) -> None:
@@ -158,63 +171,106 @@ def _unpacked_bytes(content):
     return sum(number * full if last == 0 else (number - 1) * full + last for number, full, last in blocks)
 
 
-def _dimension(kind):
-    return _DIMENSION.get(kind.rstrip("0123456789"), 0)
+def _refuse_strange_nodes(path, raw, elements):
+    """Refuse elements with nodes that the file does not have, or at places that are no numbers."""
+    for k, (_, nodes) in enumerate(raw.blocks):
+        if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(raw.points)):
+            raise InputError(f"{path}: an element has a node that is not in the file; save it again.")
+        if k in elements and not np.isfinite(raw.points[nodes]).all():
+            raise InputError(f"{path}: a node of an element has a coordinate that is not a finite number; correct it.")
 
 
-def _sets(read) -> dict[str, list[np.ndarray]]:
-    """{name: flags (e,) of each block's cells that belong to it} for regions and faces."""
-    lengths = [len(block.data) for block in read.cells]
-    found: dict[str, list[np.ndarray]] = {}
-    for name, arrays in read.cell_data.items():
-        if name.startswith((_REGION, _FACE)):
-            found[name.partition(":")[2]] = [np.asarray(values).ravel() > 0 for values in arrays]
-    for name, members in read.cell_sets.items():
-        if not name.startswith(_EMPTY):
-            found[name] = [_flags(numbers, count) for numbers, count in zip(members, lengths, strict=True)]
-    tags = read.cell_data.get("gmsh:physical")
-    for name, (tag, dimension) in (read.field_data.items() if tags else ()):
-        found[name] = [(np.asarray(values) == tag) & (_dimension(block.type) == dimension)
-                       for values, block in zip(tags, read.cells, strict=True)]
-    return found
-
-
-def _flags(members, count):
-    out = np.zeros(count, dtype=bool)
-    if members is not None and len(members):
-        out[np.asarray(members, dtype=np.int64)] = True
-    return out
-
-
-def _region_names(path, sets, elements, wanted):
-    """The sets that are regions: those in `wanted`, or else all sets with elements."""
-    known = [name for name, flags in sets.items() if any(flags[k].any() for k in elements)]
+def _region_names(path, raw, wanted):
+    """The sets that are regions: those in `wanted`, those that the file states, or else all sets with elements."""
+    known = [name for name, flags in raw.regions.items() if any(one.any() for one in flags)]
     if unknown := [name for name in wanted or () if name not in known]:
         raise InputError(f"{path}: it has no set or group of elements {unknown[0]!r}; it has {', '.join(known) or 'none'}.")
-    return list(wanted or known)
+    if wanted or raw.default_regions:
+        return list(wanted or raw.default_regions)
+    return [] if raw.numbered and len(known) == 1 else known      # one number for all elements distinguishes nothing
 
 
-def _regions_of(path, sets, count):
+def _regions_of(path, raw, sets, k):
     """Names (e,) of a block's elements; `body` where the file names no region."""
+    nodes = raw.blocks[k][1]
     if not sets:
-        return np.full(count, "body", dtype=object)
-    out, uses = np.full(count, "", dtype=object), np.zeros(count, dtype=int)
+        return np.full(len(nodes), "body", dtype=object)
+    out, uses = np.full(len(nodes), "", dtype=object), np.zeros(len(nodes), dtype=int)
     for name, flags in sets.items():
         out[flags], uses = name, uses + flags
     if (uses != 1).any():
         first = int((uses != 1).argmax())
         found = "in no region" if uses[first] == 0 else f"in {uses[first]} regions"
-        raise InputError(f"{path}: element {first} is {found}, of the sets {', '.join(sets)}; name those sets that are the "
-                         "regions, each element in one of them.")
+        x, y, z = raw.points[nodes[first]].mean(axis=0)
+        raise InputError(f"{path}: element {first} is {found}, of the sets {', '.join(sets)} (it is at {x:.4g}, {y:.4g}, {z:.4g} "
+                         "mm); name those sets that are the regions (--region), each element in one of them.")
     return out
 
 
+def _faces(path, raw, mesh, number, d):
+    """The named faces, and remarks on those that are not on the body."""
+    named, remarks = {}, []
+    facets = [k for k, dimension in enumerate(raw.dimensions) if dimension == d - 1]
+    outer = {tuple(sorted(row)) for kind, nodes in mesh.boundary.items() for row in nodes[:, :FACET_CORNERS[kind]].tolist()}
+    wanted = {name: [raw.blocks[k][1][flags[k]][:, :corners_of(raw.blocks[k][0])] for k in facets if flags[k].any()]
+              for name, flags in raw.faces.items()}
+    for name in dict.fromkeys([*wanted, *raw.sides]):
+        corners = [one for one in [*wanted.get(name, []), *raw.sides.get(name, [])] if len(one)]
+        if not corners:
+            continue
+        known = [number[one] for one in corners]
+        if all((one < 0).any(axis=1).all() for one in known):
+            remarks.append(f"the face {name} is left out, because it is not on the body")
+        elif not (inner := {tuple(sorted(row)) for block in known for row in block.tolist()} - outer):
+            named[name] = _face(mesh, known)
+        elif raw.numbered:
+            remarks.append(f"the face {name} is left out, because {len(inner)} of its facets are inside the body")
+        else:
+            at = [row for one, old in zip(known, corners, strict=True) for row, places in zip(old, one, strict=True)
+                  if tuple(sorted(places.tolist())) in inner]
+            x, y, z = raw.points[at[0]].mean(axis=0)
+            raise InputError(f"{path}: {len(inner)} facets of the face {name!r} are not on the outside of the body (one at "
+                             f"{x:.4g}, {y:.4g}, {z:.4g} mm); name outer facets only.")
+    return named, remarks
+
+
+def _face(mesh, corners):
+    """The facets of the mesh's boundary that have these corners [(f, k)]."""
+    wanted = {tuple(sorted(row)) for block in corners for row in block.tolist()}
+    found = {}
+    for kind, nodes in mesh.boundary.items():
+        here = [tuple(sorted(row)) in wanted for row in nodes[:, :FACET_CORNERS[kind]].tolist()]
+        if any(here):
+            found[kind] = nodes[here]
+    return found
+
+
+def _left_out(raw, d, sets):
+    """Remarks on cells that are neither elements nor facets of a face, and on sets that are no regions."""
+    counts: dict[str, int] = {}
+    for k, (_, nodes) in enumerate(raw.blocks):
+        below = d - raw.dimensions[k]
+        if below == 0 or raw.in_mm:
+            continue
+        used = np.any([flags[k] for flags in raw.faces.values() if below == 1] or [np.zeros(len(nodes), bool)], axis=0)
+        if count := int(np.count_nonzero(~used)):
+            name = "facets" if below == 1 else ("points", "lines")[raw.dimensions[k]]
+            counts[name] = counts.get(name, 0) + count
+    cells = [f"cells in no face and of no body are left out: {', '.join(f'{count} {name}' for name, count in counts.items())}"]
+    return (cells if counts else []) + ([f"sets that are no regions: {', '.join(sets)} (--region names others)"] if sets else [])
+
+
 def _quadratic(path, points, cells):
-    """Points, [(kind, nodes in softtact's order)] of quadratic elements, and the new number (n,) of each point of the file."""
+    """Points, [(kind, nodes in softtact's order)] of quadratic elements, and the new number (n,) of each point of the file, -1 of
+    those that no element has.
+    """
     kinds = {kind for kind, _ in cells}
     if kinds <= ELEMENTS.keys():
         back = {kind: np.argsort(ELEMENTS[kind].vtk_order) for kind in kinds}
-        return points, [(kind, nodes[:, back[kind]]) for kind, nodes in cells], np.arange(len(points))
+        used = np.unique(np.concatenate([nodes.ravel() for _, nodes in cells]))
+        number = np.full(len(points), -1)
+        number[used] = used
+        return points, [(kind, nodes[:, back[kind]]) for kind, nodes in cells], number
     if not kinds <= QUADRATIC.keys():
         odd = sorted(kinds - ELEMENTS.keys() - QUADRATIC.keys()) or sorted(kinds)
         refusal = "does not take" if kinds - ELEMENTS.keys() - QUADRATIC.keys() else "does not mix"
@@ -232,50 +288,21 @@ def _upright(points, wedges):
     return np.where(below[:, None], wedges[:, _TURNED_WEDGE], wedges)
 
 
-def _geometry(path, read, geometry, thickness_mm, d, points) -> tuple[str, float]:
-    stated: dict[str, Any] = {name.removeprefix(_GEOMETRY): arrays for name, arrays in read.cell_data.items()
-                            if name.startswith(_GEOMETRY)}
-    if stated:
-        kind, arrays = next(iter(stated.items()))
-        return kind, float(np.concatenate([np.ravel(values) for values in arrays])[0])
+def _geometry(path, raw, geometry, thickness_mm, d, points) -> tuple[str, float]:
     if d == 3:
         return "solid", 1.0
+    if raw.thickness_mm is not None:
+        return raw.geometry, raw.thickness_mm
     if np.ptp(points[:, 2]) > 0:
         raise InputError(f"{path}: it holds a surface in space and no solid elements; mesh the body inside it, for example with "
                          "`softtact mesh`.")
     if geometry not in ("plane_strain", "axisymmetric"):
+        if geometry is None and raw.geometry:
+            return raw.geometry, thickness_mm
         raise InputError(f"{path}: it is a plane mesh; state its geometry, plane_strain or axisymmetric.")
+    if raw.geometry not in (None, geometry):
+        raw.remarks.append(f"its elements are called {raw.geometry}, and are taken as {geometry}")
     return geometry, thickness_mm
-
-
-def _refuse_inverted(path, mesh):
-    """Refuse elements whose Jacobian is not positive at all points of quadrature."""
-    for region, element, nodes in mesh.parts():
-        d = element.nodes.shape[1]
-        slopes = element.shape(element.quadrature.points)[1]
-        jacobian = np.einsum("emi,gmj->egij", mesh.points[nodes][..., :d], slopes, optimize=True)
-        inverted = np.flatnonzero(np.linalg.det(jacobian).min(axis=1) <= 0)
-        if len(inverted):
-            x, y, z = mesh.points[nodes[inverted[0]]].mean(axis=0)
-            raise InputError(f"{path}: {len(inverted)} of {len(nodes)} elements of the region {region!r} are inverted (the first "
-                             f"is number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); reverse the order of their nodes, "
-                             "or mesh the body again.")
-
-
-def _face(path, mesh, name, corners):
-    """The facets of the mesh's boundary that have these corners [(f, k)]."""
-    wanted = {tuple(sorted(row)) for block in corners for row in block.tolist()}
-    found, known = {}, set()
-    for kind, nodes in mesh.boundary.items():
-        keys = [tuple(sorted(row)) for row in nodes[:, :_FACET_CORNERS[kind]].tolist()]
-        if (here := np.array([key in wanted for key in keys])).any():
-            found[kind] = nodes[here]
-        known.update(keys)
-    if missing := wanted - known:
-        x, y, z = mesh.points[list(next(iter(missing)))].mean(axis=0) if min(next(iter(missing))) >= 0 else (np.nan,) * 3
-        raise InputError(f"{path}: {len(missing)} facets of the face {name!r} are not on the outside of the body (one at {x:.4g}, "
-                         f"{y:.4g}, {z:.4g} mm); name outer facets only.")
-    return found
 
 
 def face_rule(text: str) -> Callable[[np.ndarray], np.ndarray]:

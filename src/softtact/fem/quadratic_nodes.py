@@ -60,8 +60,8 @@ def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -
 
 def _keys(corners, members, width):
     """The corners (e, m, width) of the edge, face or element of each node, in rising order after entries of -1."""
-    keys = np.where(members[None], corners[:, None, :], -1)
-    return np.sort(keys, axis=2)[..., -width:]
+    keys = np.sort(np.where(members[None], corners[:, None, :], -1), axis=2)[..., -width:]
+    return np.pad(keys, ((0, 0), (0, 0), (width - keys.shape[2], 0)), constant_values=-1)
 
 
 def _members(kind: str) -> np.ndarray:

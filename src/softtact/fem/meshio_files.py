@@ -1,0 +1,185 @@
+"""Files of other formats, read by meshio: VTU with regions and faces of softtact, VTK, MED, Medit, Nastran, TetGen and others.
+
+meshio leaves out some cells with a word on stderr or without one. Cells that it does not know are refused here by name, and so are
+files of which it read fewer cells than they state.
+"""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.fem.raw_mesh import Flags, RawMesh, dimension_of
+from softtact.inputs import in_one_sentence
+
+if TYPE_CHECKING:
+    import meshio
+
+REGION, FACE, GEOMETRY = "region:", "face:", "geometry:"     # beginnings of the names of cell arrays in softtact's VTU files
+_BY_MESHIO = ("meshio", "gmsh:", "medit", "avsucd")     # beginnings of names of sets that it gives by itself
+# Cell arrays with a material's number, by the letters and digits of their names.
+_NUMBERS = {"gmshphysical", "meditref", "nastranref", "tetgenref", "avsucdmaterial", "netgenindex", "ugridref", "su2tag",
+            "materialids", "materialid", "material", "materials", "matid", "matids", "mat", "region", "regions", "regionid",
+            "regionids", "part", "partid", "partids", "elementblockids", "cellentityids", "entityids", "physical", "subdomain",
+            "subdomains", "blockid", "block"}
+_VTK_NAMES = {2: "poly vertex", 4: "poly line", 6: "triangle strip", 7: "polygon", 11: "voxel", 41: "convex point set",
+              42: "polyhedron"}
+# Cells of VTK by meshio's name and number of nodes, that are those of another kind.
+_SAME = {"VTK_LAGRANGE_CURVE2": "line", "VTK_LAGRANGE_CURVE3": "line3", "VTK_LAGRANGE_TRIANGLE3": "triangle",
+         "VTK_LAGRANGE_TRIANGLE6": "triangle6", "VTK_LAGRANGE_QUADRILATERAL4": "quad", "VTK_LAGRANGE_QUADRILATERAL9": "quad9",
+         "VTK_LAGRANGE_TETRAHEDRON4": "tetra", "VTK_LAGRANGE_TETRAHEDRON10": "tetra10", "VTK_LAGRANGE_HEXAHEDRON8": "hexahedron",
+         "VTK_LAGRANGE_WEDGE6": "wedge"}
+_UNHANDLED = {"pixel", "wedge15", *(f"vtk_{order}_{shape}" for order in ("lagrange", "bezier") for shape in (
+    "curve", "triangle", "quadrilateral", "tetrahedron", "hexahedron", "wedge", "pyramid"))}
+_DROPPED = re.compile(r"cannot handle \(type (\d+)\)|doesn't know \w*(?:Tetra|Hexa|Prism|Pyramid|Triangles|Quadri)\w* type")
+_NASTRAN = (".bdf", ".nas", ".fem")
+_COUNT = re.compile(rb"(?:\A|^[ \t]*(?:[A-Za-z]+[ \t]+)?)(\d{3,})(?=[ \t\r]*$|[ \t]+3[ \t])", re.MULTILINE)
+_CARD = re.compile(rb"^[ \t]*C(?:TETRA|HEXA|PENTA|PYRAM?|TRIA|TRAX|QUAD|SHEAR)\w*\*?[ \t,]", re.IGNORECASE | re.MULTILINE)
+
+
+def read_other(path: Path) -> RawMesh:
+    """The `RawMesh` of a file. Raises InputError for what meshio cannot read, or does not read whole."""
+    read, said = _read(path)
+    _refuse_incomplete(path, read, said)
+    blocks = [_block(path, block.type, np.asarray(block.data, dtype=object if block.type.startswith("poly") else np.int64))
+              for block in read.cells]
+    points = np.zeros((len(read.points), 3))
+    points[:, :read.points.shape[1]] = read.points
+    raw = RawMesh(points, blocks, remarks=[f"meshio warns: {one}" for one in said])
+    _take_sets(read, raw)
+    if not raw.regions and not raw.faces:
+        _take_numbers(read, raw)
+    stated: dict[str, Any] = {name.removeprefix(GEOMETRY): arrays for name, arrays in read.cell_data.items()
+                              if name.startswith(GEOMETRY)}
+    if stated:
+        raw.geometry, arrays = next(iter(stated.items()))
+        raw.thickness_mm = float(np.concatenate([np.ravel(values) for values in arrays])[0])
+    raw.in_mm = any(name.startswith(REGION) for name in read.cell_data)
+    return raw
+
+
+def _read(path: Path) -> tuple["meshio.Mesh", list[str]]:
+    """The mesh as meshio reads it, and its warnings, which it prints."""
+    import meshio
+
+    _refuse_impossible_counts(path)
+    printed = io.StringIO()
+    known = "give VTU, or another volume mesh that is read, such as those of Gmsh or Abaqus"
+    with in_one_sentence(path, "not readable as a mesh of elements", known):
+        try:
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+                read = meshio.read(path)
+        except SystemExit:     # meshio ends the program for an unknown format
+            text = " ".join(printed.getvalue().split()).removeprefix("Error: ")
+            raise ValueError(text or "unknown format") from None
+        except KeyError as error:     # of a kind of cells that it names and does not handle
+            if (kind := str(error.args[0]).lower()) in _UNHANDLED:
+                raise _not_taken(path, kind) from None
+            raise
+    warned = " ".join(printed.getvalue().split()).split("Warning: ")[1:]
+    return read, list(dict.fromkeys(one.strip().rstrip(".") for one in warned))
+
+
+def _refuse_impossible_counts(path):
+    """Refuse a text of Medit or TetGen that states more entries than it has bytes: meshio would ask for memory for all of them."""
+    if path.suffix.lower() in (".mesh", ".ele", ".node"):
+        content = path.read_bytes()
+        stated = [int(number) for number in _COUNT.findall(content)]
+        if max(stated, default=0) > len(content):
+            raise InputError(f"{path}: it states {max(stated)} entries and has {len(content)} bytes; save it again.")
+
+
+def _not_taken(path, name):
+    return InputError(f"{path}: it has cells that are not taken ({name}); convert them into tetrahedra, hexahedra or wedges of the "
+                      "first or second order, for example with ParaView.")
+
+
+def _refuse_incomplete(path, read, said):
+    for one in said:
+        if found := _DROPPED.search(one):
+            name = f"{_VTK_NAMES.get(int(found[1]), 'other cells')}, type {found[1]} of VTK" if found[1] else found[0]
+            raise _not_taken(path, name)
+    of_cards = path.suffix.lower() in _NASTRAN      # those of lines and points have other names
+    count = sum(len(block.data) for block in read.cells if not of_cards or dimension_of(block.type) > 1)
+    if (stated := _stated_cells(path)) is not None and stated != count:
+        pieces = "; save it in one piece" if path.suffix.lower() == ".vtu" else ""
+        raise InputError(f"{path}: only {count} of its {stated} cells can be read{pieces or '; save it in another format'}.")
+    if path.suffix.lower() in _NASTRAN and np.any(read.point_data.get("nastran:ref", 0)):
+        raise InputError(f"{path}: it has nodes in a coordinate system of their own (field CP of GRID), which is not read; write "
+                         "them in the basic one.")
+
+
+def _stated_cells(path):
+    """Number of cells that a file says it has, None where it does not."""
+    suffix, content = path.suffix.lower(), path.read_bytes()
+    if suffix == ".vtu":
+        return sum(map(int, re.findall(rb'<Piece[^>]*NumberOfCells="\s*(\d{1,12})', content)))
+    if suffix == ".vtk":
+        found = re.search(rb"^CELL_TYPES\s+(\d{1,12})", content, re.MULTILINE)
+        return int(found[1]) if found else None
+    return len(_CARD.findall(content)) if suffix in _NASTRAN else None
+
+
+def _block(path, kind, nodes):
+    if kind.startswith("VTK_"):
+        kind = _SAME.get(f"{kind}{nodes.shape[1]}", kind)
+    if dimension_of(kind) < 0:
+        raise _not_taken(path, kind.lower())
+    return kind, nodes
+
+
+def _take_sets(read, raw):
+    """Regions and faces by name: of softtact, sets of cells, groups of MED."""
+    lengths = [len(nodes) for _, nodes in raw.blocks]
+    for name, arrays in read.cell_data.items():
+        for beginning, into in ((REGION, raw.regions), (FACE, raw.faces)):
+            if name.startswith(beginning):
+                into[name.removeprefix(beginning)] = [np.asarray(values).ravel() > 0 for values in arrays]
+    for name, members in read.cell_sets.items():
+        if not name.startswith(_BY_MESHIO):
+            _take_set(raw, name, [_flags(numbers, count) for numbers, count in zip(members, lengths, strict=True)])
+    families = getattr(read, "cell_tags", None) or {}
+    for name in dict.fromkeys(name for names in families.values() for name in names):
+        members = [number for number, names in families.items() if name in names]
+        _take_set(raw, str(name), [np.isin(np.ravel(values), members) for values in read.cell_data["cell_tags"]])
+
+
+def _take_numbers(read, raw):
+    """Regions and faces by their numbers, where the file has an array of those; 0 is no face."""
+    arrays = {name: values for name, values in read.cell_data.items() if re.sub(r"[^a-z0-9]", "", name.lower()) in _NUMBERS}
+    for name, values in arrays.items():
+        numbers = [np.ravel(one) for one in values]
+        if not all(len(one) == len(nodes) for one, (_, nodes) in zip(numbers, raw.blocks, strict=True)):
+            continue
+        found = np.concatenate(numbers).astype(float)
+        if not (np.abs(found) < 2**31).all() or (found != found.round()).any():
+            continue
+        for number in np.unique(found).astype(np.int64):
+            flags = [one == number for one in numbers]
+            _take_set(raw, str(number), flags)
+            if number == 0:
+                raw.faces.pop("0", None)
+        raw.numbered = True
+        if others := [other for other in arrays if other != name]:
+            raw.remarks.append(f"the regions are those of the array {name}; left out: {', '.join(others)}")
+        return
+
+
+def _take_set(raw, name, flags: Flags):
+    """A set as a region, of its elements, and as a face, of its facets."""
+    d = max(raw.dimensions, default=0)
+    for into, dimension in ((raw.regions, d), (raw.faces, d - 1)):
+        chosen = [one & (own == dimension) for one, own in zip(flags, raw.dimensions, strict=True)]
+        if any(one.any() for one in chosen):
+            into[name] = chosen
+
+
+def _flags(members, count):
+    out = np.zeros(count, dtype=bool)
+    if members is not None and len(members):
+        out[np.asarray(members, dtype=np.int64)] = True
+    return out

@@ -1,0 +1,129 @@
+"""Formats that meshio reads: numbers of materials become regions, and cells that it leaves out are refused by their names."""
+
+import meshio
+import numpy as np
+import pytest
+
+from softtact.errors import InputError
+from softtact.fem.mesh_files import read_body, write_mesh
+from softtact.fem.structured_meshes import box
+from tests.support.element_files import BLOCK_MM3, block, hexahedra, skin
+
+NODES, TETRA = block()
+NUMBER = np.where(NODES[TETRA].mean(axis=1)[:, 2] > 2, 7, 3)
+TOP = skin(NODES, TETRA)[0]
+
+
+def vtu(nodes, blocks, piece=1, **arrays):
+    """A VTU file of blocks [(VTK's type, cells)] and arrays of whole numbers on all cells."""
+    def array(name, values, kind="Int64"):
+        return f'<DataArray type="{kind}" Name="{name}" format="ascii">{" ".join(map(str, values))}</DataArray>'
+    cells = [cell for _, block in blocks for cell in block]
+    types = [kind for kind, block in blocks for _ in block]
+    data = "".join(array(name, values) for name, values in arrays.items())
+    one = (f'<Piece NumberOfPoints="{len(nodes)}" NumberOfCells="{len(cells)}"><Points><DataArray type="Float64" '
+           f'NumberOfComponents="3" format="ascii">{" ".join(f"{v:g}" for v in np.ravel(nodes))}</DataArray></Points><Cells>'
+           + array("connectivity", [n for cell in cells for n in cell]) + array("offsets", np.cumsum(list(map(len, cells))))
+           + array("types", types, "UInt8") + f"</Cells><CellData>{data}</CellData></Piece>")
+    return ('<?xml version="1.0"?><VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid>'
+            + one * piece + "</UnstructuredGrid></VTKFile>")
+
+
+def medit(folder):
+    rows = "".join(f"{' '.join(str(n + 1) for n in cell)} {number}\n" for cell, number in zip(TETRA, NUMBER, strict=True))
+    facets = "".join(f"{' '.join(str(n + 1) for n in facet)} 5\n" for facet in TOP)
+    (folder / "body.mesh").write_text("MeshVersionFormatted 2\nDimension 3\nVertices\n27\n"
+                                      + "".join(f"{x:g} {y:g} {z:g} 0\n" for x, y, z in NODES)
+                                      + f"Triangles\n{len(TOP)}\n{facets}Tetrahedra\n{len(TETRA)}\n{rows}End\n")
+    return folder / "body.mesh"
+
+
+def nastran(folder, card="CTETRA"):
+    grid = "".join(f"GRID,{k + 1},,{x:.1f},{y:.1f},{z:.1f}\n" for k, (x, y, z) in enumerate(NODES))
+    cards = "".join(f"{card},{k + 1},{number},{','.join(str(n + 1) for n in cell)}\n"
+                    for k, (cell, number) in enumerate(zip(TETRA, NUMBER, strict=True)))
+    (folder / "body.bdf").write_text(f"BEGIN BULK\n{grid}{cards}ENDDATA\n")
+    return folder / "body.bdf"
+
+
+def tetgen(folder):
+    (folder / "body.node").write_text("27 3 0 0\n" + "".join(f"{k + 1} {x:g} {y:g} {z:g}\n" for k, (x, y, z) in enumerate(NODES)))
+    rows = [f"{k + 1} {' '.join(str(n + 1) for n in cell)} {number}\n" for k, (cell, number)
+            in enumerate(zip(TETRA, NUMBER, strict=True))]
+    (folder / "body.ele").write_text("48 4 1\n" + "".join(rows))
+    return folder / "body.ele"
+
+
+def paraview(folder, name="MaterialIDs"):
+    (folder / "body.vtu").write_text(vtu(NODES, [(10, TETRA)], **{name: NUMBER}))
+    return folder / "body.vtu"
+
+
+def med(folder):
+    mesh = meshio.Mesh(NODES, [("tetra", TETRA)], cell_data={"cell_tags": [np.where(NUMBER == 7, -7, -3)]})
+    mesh.cell_tags = {-7: ["7"], -3: ["3"]}
+    mesh.write(folder / "body.med")
+    return folder / "body.med"
+
+
+@pytest.mark.parametrize("write", [medit, nastran, tetgen, paraview, med])
+def test_materials_by_number_become_regions(write, tmp_path):
+    body = read_body(write(tmp_path), unit="mm")
+    assert {region: len(nodes) for region, _, nodes in body.mesh.cells} == {"3": 24, "7": 24}
+    upper = np.concatenate([nodes for region, _, nodes in body.mesh.cells if region == "7"])
+    assert body.mesh.points[upper][..., 2].min() == 2 and body.mesh.volume_mm3() == pytest.approx(BLOCK_MM3)
+
+
+def test_numbers_of_facets_become_faces(tmp_path):
+    assert len(read_body(medit(tmp_path), unit="mm").mesh.faces["5"]["triangle6"]) == 8
+
+
+def test_one_number_for_all_elements_distinguishes_nothing(tmp_path):
+    (tmp_path / "body.vtu").write_text(vtu(NODES, [(10, TETRA)], MaterialIDs=[4] * len(TETRA)))
+    assert read_body(tmp_path / "body.vtu", unit="mm").mesh.regions == ["body"]
+
+
+@pytest.mark.parametrize("kind", ["tetrahedra", "hexahedra"])
+def test_cells_of_vtk_that_are_others_by_another_name_are_taken(kind, tmp_path):
+    nodes, hexes = hexahedra()
+    blocks = {"tetrahedra": [(10, TETRA[:9]), (71, TETRA[9:])], "hexahedra": [(12, hexes[4:]), (72, hexes[:4])]}[kind]
+    (tmp_path / "body.vtu").write_text(vtu(nodes, blocks))
+    assert read_body(tmp_path / "body.vtu", unit="mm").mesh.volume_mm3() == pytest.approx(BLOCK_MM3)
+
+
+def test_cells_that_are_not_taken_are_refused_by_name(tmp_path):
+    nodes, hexes = hexahedra()
+    voxels = hexes[:, [0, 1, 3, 2, 4, 5, 7, 6]]
+    for blocks, told in [
+        ([(10, TETRA[24:]), (11, voxels[:4])], "voxel, type 11 of VTK"),
+        ([(12, hexes[4:]), (11, voxels[:4])], "voxel, type 11 of VTK"),
+        ([(12, hexes[4:]), (79, hexes[:4])], "vtk_bezier_hexahedron"),
+        ([(10, TETRA), (8, hexes[2:4, [0, 1, 3, 2]])], "pixel"),
+        ([(12, hexes[4:]), (65, hexes[:4])], "type 65 of VTK"),
+        ([(12, hexes[4:]), (7, hexes[:4, :5])], "polygon"),
+        ([(12, hexes[4:]), (14, hexes[:4, :5])], "pyramid"),
+    ]:
+        (tmp_path / "body.vtu").write_text(vtu(nodes, blocks))
+        with pytest.raises(InputError, match=told) as refusal:
+            read_body(tmp_path / "body.vtu", unit="mm")
+        assert "body.vtu" in str(refusal.value) and "\n" not in str(refusal.value)
+
+
+def test_a_file_of_which_cells_would_be_lost_is_refused(tmp_path):
+    (tmp_path / "body.vtu").write_text(vtu(NODES, [(10, TETRA)], piece=2))
+    with pytest.raises(InputError, match="only 48 of its 96 cells can be read; save it in one piece"):
+        read_body(tmp_path / "body.vtu", unit="mm")
+    text = nastran(tmp_path).read_text()
+    for wrong, told in ((text.replace("CTETRA,1,", " ctetra,1,"), "only 47 of its 48 cells"),
+                        (text.replace("CTETRA,9,", "CTETRA*,9,"), "only 47 of its 48 cells"),
+                        (text.replace("GRID,4,,", "GRID,4,1,"), "field CP of GRID")):
+        (tmp_path / "body.bdf").write_text(wrong)
+        with pytest.raises(InputError, match=told):
+            read_body(tmp_path / "body.bdf", unit="mm")
+
+
+def test_a_region_and_a_face_of_one_name_survive_softtact_s_own_file(tmp_path):
+    mesh = box((0, 0, 0), (1, 1, 1), (1, 1, 1), region="gel").with_faces(gel=lambda middles: middles[:, 2] > 0.9)
+    write_mesh(mesh, tmp_path / "body.vtu")
+    found = read_body(tmp_path / "body.vtu")
+    assert found.mesh.regions == ["gel"] and len(found.mesh.faces["gel"]["quad9"]) == 1 and not found.remarks
