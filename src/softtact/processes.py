@@ -76,7 +76,16 @@ def _wait_for(handle):
 
 def run_tied(command: Sequence[str], **options: Any) -> subprocess.CompletedProcess:
     """`subprocess.run` of a command that ends with this process (on Linux)."""
-    return subprocess.run([sys.executable, "-I", "-S", "-c", _TIED, str(os.getpid()), *command], **options)
+    return subprocess.run(_tied(command), **options)
+
+
+def start_tied(command: Sequence[str], **options: Any) -> subprocess.Popen:
+    """`subprocess.Popen` of a command that ends with this process (on Linux)."""
+    return subprocess.Popen(_tied(command), **options)
+
+
+def _tied(command):
+    return [sys.executable, "-I", "-S", "-c", _TIED, str(os.getpid()), *command]
 
 
 def call_apart(function: Callable[..., _Result], *arguments: Any) -> _Result:

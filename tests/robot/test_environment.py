@@ -106,7 +106,69 @@ def test_environments_run_beside_each_other_in_processes():
                                              ({"mesh": "part.stl"}, "part.stl: there is no such mesh file"),
                                              ({"largest_force_n": 90.0}, "The force 90 N is out of the range"),
                                              ({"place_step_mm": 0.0}, "place_step_mm=0: give a length in mm above 0 and below"),
-                                             ({"scene": {"frction": 1}}, "at 'frction': the key is unknown")])
+                                             ({"scene": {"frction": 1}}, "at 'frction': the key is unknown"),
+                                             ({"scene": ["friction"]}, r"scene=\['friction'\]: give keys and values"),
+                                             ({"mass_kg": 0.0}, "mass_kg=0.0: give a finite number from 1e-06 to 100 .kg"),
+                                             ({"mass_kg": -1}, "mass_kg=-1: give a finite number"),
+                                             ({"mass_kg": "1"}, "mass_kg='1': give a finite number"),
+                                             ({"largest_force_n": np.nan}, "largest_force_n=nan: give a finite number .N"),
+                                             ({"render_mode": "ansi"}, "render_mode='ansi': the environment draws images only")])
+@pytest.mark.filterwarnings("ignore:.*render_mode='ansi'")
 def test_a_wrong_argument_is_refused_in_one_sentence(wrong, said):
     with pytest.raises(InputError, match=said):
         gymnasium.make(ID, **wrong)
+
+
+@pytest.mark.parametrize("action", [[np.nan, 0, 0], [1, np.nan, 0], [0, 0, np.inf], [0, 0], [0, 0, 0, 0], ["close", 0, 0], 1.0,
+                                    None])
+def test_an_action_that_is_not_three_finite_numbers_is_refused_and_moves_nothing(env, action):
+    env.reset(seed=1, options=STILL)
+    before = env.unwrapped._data.time
+    with pytest.raises(InputError, match="step: the action .* is not three finite numbers from -1 to 1; give grip, lift and slide"):
+        env.unwrapped.step(action)
+    assert env.unwrapped._data.time == before
+
+
+@pytest.mark.parametrize(("options", "sentence"), [
+    ({"x_mm": "1"}, "reset: x_mm='1': give a finite number"), ({"y_mm": np.nan}, "reset: y_mm=nan: give a finite number"),
+    ({"angle_deg": None}, "reset: angle_deg=None: give a finite number"),
+    ({"x_mm": 500}, "reset: x_mm=500, .*: no part of the object is between the pads"),
+    ({"y_mm": -40.0}, "y_mm=-40: no part of the object is between the pads of 22 x 37 mm"),
+    ({"z_mm": 1.0}, "reset: the option 'z_mm' is unknown; use one of x_mm")])
+def test_a_placement_that_is_no_number_or_beside_the_pads_is_refused_by_its_name(env, options, sentence):
+    with pytest.raises(InputError, match=sentence):
+        env.reset(seed=1, options=options)
+
+
+def test_a_placement_at_the_rim_of_the_pads_is_taken(env):
+    env.reset(seed=1, options=STILL | {"y_mm": 25.0})     # the cylinder's radius is 8 mm, the pads end at 18.5 mm
+
+
+def test_the_environment_draws_the_hand_and_what_it_lifts():
+    env = gymnasium.make(ID, render_mode="rgb_array")
+    try:
+        env.reset(seed=1, options=STILL)
+        open_hand = env.render()
+        for _ in range(25):
+            env.step(np.array(CLOSE, dtype=np.float32))
+        closed = env.render()
+    except InputError as error:
+        pytest.skip(str(error))     # no EGL here
+    finally:
+        env.close()
+    assert open_hand.shape == (480, 640, 3) and open_hand.dtype == np.uint8 and open_hand.std() > 10
+    assert (np.abs(open_hand.astype(int) - closed).max(axis=2) > 30).sum() > 1000     # pixels in which the fingers moved
+
+
+def test_without_a_render_mode_nothing_is_drawn(env):
+    env.reset(seed=1)
+    assert env.unwrapped.render() is None
+
+
+def test_a_computer_that_cannot_draw_says_so_when_a_picture_is_asked_for(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    env = gymnasium.make(ID, render_mode="rgb_array")
+    env.reset(seed=1)
+    with pytest.raises(InputError, match="MuJoCo does not draw off screen here .*; install EGL"):
+        env.render()
+    env.close()

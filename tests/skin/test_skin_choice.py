@@ -61,8 +61,21 @@ def test_extrapolation_is_said_and_refused_beyond_twice_the_tested_stress(known)
         foam.strain(0.05)
     with pytest.raises(InputError, match="tested up to 42.2 kPa, and 90 kPa is beyond twice that"):
         foam.strain(0.09)
-    with pytest.raises(InputError, match="Polytek polyurethane: its curve has a strain of -"):
-        known["Polytek polyurethane"].strain(0.001)
+
+
+def test_below_the_lowest_tested_stress_the_strain_falls_in_proportion_to_it(known):
+    for elastomer in known.values():
+        low = elastomer.tested_mpa[0]
+        with pytest.warns(ExtrapolationWarning, match="its modulus is held as at the lowest tested stress"):
+            assert elastomer.strain(1e-3 * low) == pytest.approx(5e-5)     # 5 % at the lowest tested stress
+        assert elastomer.tested_young_mpa(1e-6 * low) == pytest.approx(elastomer.young_mpa(1.0001 * low), rel=1e-3)
+
+
+def test_a_curve_that_is_strained_without_stress_by_more_than_the_test_begins_with_is_refused(tmp_path):
+    (tmp_path / "mine.yaml").write_text("elastomers: [{name: gel, strain_percent: [6, 500, 0, 0], density_g_cm3: 1, poisson: 0.45, "
+                                        "permittivity: 3, permittivity_fe: 3}]")
+    with pytest.raises(InputError, match="gel: its curve has a strain of 6.50% at 1 kPa and 6.00% without stress"):
+        read_elastomers(tmp_path / "mine.yaml")["gel"].strain(0.001)
 
 
 def test_an_own_elastomer_joins_those_that_ship(tmp_path):

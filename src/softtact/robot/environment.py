@@ -7,7 +7,6 @@ Importing this module registers the environment.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +14,18 @@ import gymnasium
 import mujoco
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
-from softtact.geometry.meshes import read_mesh
+from softtact.geometry.meshes import facets_over, place, read_mesh
 from softtact.press.sensor import load_sensor
 from softtact.robot.arm import HOME_RAD, JOINTS, inverse_kinematics
 from softtact.robot.events import FINGERS
 from softtact.robot.gels import GelReadings, has_gel
 from softtact.robot.grasp import contacts, object_poses, pad_forces
-from softtact.robot.scene import DOWN, MM, Placement, Scene, build_scene, start
-from softtact.robot.settings import load_scene
+from softtact.robot.render import Painter
+from softtact.robot.scene import DOWN, MM, Placement, Scene, build_scene, mass_of, start
+from softtact.robot.settings import load_scene, number
 from softtact.robot.taxels import STEP_MM, TaxelMemory
 
 ENVIRONMENT = "softtact/Grasp-v0"
@@ -49,22 +50,28 @@ class GraspEnv(gymnasium.Env):
     Reward: height gained by the object, as a share of 40 mm. An episode ends when the object is lifted by 40 mm, or dropped.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": round(1 / STEP_S)}
 
     def __init__(self, mesh: trimesh.Trimesh | str | Path | None = None, *, unit: str | None = None, sensor: str = "coro",
                  model: str = "elastic", largest_force_n: float = 30.0, mass_kg: float | None = None,
-                 scene: Mapping[str, Any] | None = None, place_step_mm: float = STEP_MM) -> None:
+                 scene: Mapping[str, Any] | None = None, place_step_mm: float = STEP_MM, render_mode: str | None = None) -> None:
         """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder with its flat ends on the pads
 
         model: elastic or foundation;  scene: keys of a scene file, such as {"friction": 0.4}
         place_step_mm: grid of the places that are pressed (`TaxelMemory`); of taxels alone
+        render_mode: rgb_array, for pictures of the hand by `render`, or None
         Raises InputError for a model that is too slow, and as `build_scene` does.
         """
         if model not in ("elastic", "foundation"):
             raise InputError(f"model={model!r}: an environment needs a reading in milliseconds; use 'elastic' or 'foundation'.")
-        self._sensor, self._settings, self._mass_kg = load_sensor(sensor), load_scene(**(scene or {})), mass_kg
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"render_mode={render_mode!r}: the environment draws images only; use 'rgb_array', or leave it out.")
+        self.render_mode, self._painter = render_mode, Painter()
+        self._sensor, self._settings = load_sensor(sensor), load_scene(**_keys(scene))
+        self._mass_kg = None if mass_kg is None else mass_of(mass_kg)
         self._mesh = _mesh_of(mesh, unit)
-        self.largest_force_n = float(largest_force_n)
+        self.largest_force_n = number("largest_force_n", largest_force_n, unit="N")
+        place_step_mm = number("place_step_mm", place_step_mm, unit="mm")
         self._readings: TaxelMemory | GelReadings
         if has_gel(self._sensor):
             self._readings = GelReadings(self._sensor, self._mesh, self._settings.friction, model, self.largest_force_n)
@@ -83,18 +90,29 @@ class GraspEnv(gymnasium.Env):
         options: x_mm, y_mm, angle_deg, in place of random values
         """
         super().reset(seed=seed)
-        for name in set(options or {}) - set(_SPREAD):
-            raise InputError(f"reset: the option {name!r} is unknown; use one of {', '.join(_SPREAD)}.")
         drawn = {name: float(self.np_random.uniform(-side, side)) for name, side in _SPREAD.items()}
-        placement = replace(Placement(**drawn), **(options or {}))
-        self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, placement, mass_kg=self._mass_kg)
+        self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, self._placement(drawn, options or {}),
+                                  mass_kg=self._mass_kg)
         self._place_hand()
         self._readings.begin()
         return self._observe(), self._info()
 
+    def _placement(self, drawn, given):
+        """The drawn placement with the values that are given; one beside the pads is refused."""
+        for name in set(given) - set(_SPREAD):
+            raise InputError(f"reset: the option {name!r} is unknown; use one of {', '.join(_SPREAD)}.")
+        placement = Placement(**drawn | {name: number(f"reset: {name}", value) for name, value in given.items()})
+        turn = Rotation.from_euler("z", placement.angle_deg, degrees=True).as_matrix()
+        triangles = place(self._mesh).triangles @ turn.T + [placement.x_mm, placement.y_mm, 0.0]
+        width, length = self._sensor.spec.footprint_mm
+        if given and not facets_over(triangles, (width, length)).any():
+            raise InputError(f"reset: x_mm={placement.x_mm:g}, y_mm={placement.y_mm:g}: no part of the object is between the pads "
+                             f"of {width:g} x {length:g} mm; give a place nearer to their middle, 0, 0.")
+        return placement
+
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Ten milliseconds of the scene."""
-        grip, lift, slide = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        grip, lift, slide = np.clip(_three_numbers(action), -1.0, 1.0)
         self._move_hand(lift, slide)
         self._move_fingers(0.5 * (grip + 1.0))
         before = self._risen_mm()
@@ -104,6 +122,14 @@ class GraspEnv(gymnasium.Env):
         risen = self._risen_mm()
         ended = risen < -_DROPPED_MM or risen > 0.98 * LIFT_MM
         return self._observe(), float((risen - before) / LIFT_MM), bool(ended), False, self._info()
+
+    def render(self) -> np.ndarray | None:
+        """Image (480, 640, 3), uint8, of the hand and the object; None without a `render_mode`."""
+        return None if self.render_mode is None else self._painter.draw(self._scene, self._data)
+
+    def close(self) -> None:
+        """End the process that draws."""
+        self._painter.close()
 
     def _place_hand(self):
         """Put the hand at the grip, at rest, with open fingers."""
@@ -157,6 +183,25 @@ class GraspEnv(gymnasium.Env):
 
     def _info(self):
         return {"risen_mm": self._risen_mm(), "opening_mm": self._scene.opening_mm(self._data), **self._readings.facts()}
+
+
+def _three_numbers(action):
+    """An action as three finite numbers."""
+    try:
+        values = np.asarray(action, dtype=float)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        shown = np.asarray(action, dtype=object).tolist()
+        raise InputError(f"step: the action {shown} is not three finite numbers from -1 to 1; give grip, lift and slide.")
+    return values
+
+
+def _keys(scene):
+    """The keys of a scene."""
+    if not isinstance(scene, Mapping | None) or any(not isinstance(name, str) for name in scene or {}):
+        raise InputError(f"scene={scene!r}: give keys and values of a scene file, such as {{'friction': 0.4}}.")
+    return scene or {}
 
 
 def _space_of(values):

@@ -1,8 +1,11 @@
 """Draw states of a scene in a separate process: `python -m softtact.robot.offscreen FOLDER` (see `render`).
 
-It imports only MuJoCo and NumPy, so a picture does not wait for the imports of the rest.
+Without a folder it draws the state of each line of stdin, until stdin ends. It imports only MuJoCo and NumPy, so a picture does not
+wait for the imports of the rest.
 """
 
+import json
+import os
 import sys
 from pathlib import Path
 
@@ -29,6 +32,33 @@ def main(folder: str | Path) -> None:
     np.savez(folder / "images.npz", images=images)
 
 
+def serve() -> None:
+    """Draw a state for each line of stdin, and write each image, (height, width, 3) bytes, to stdout.
+
+    A line is JSON: `scene`, the path of a scene.mjb where it is another one than before, else null; `qpos`, `camera`, `size`
+    """
+    import mujoco
+
+    images = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)     # what drivers print must not come between the images
+    mujoco.set_mju_user_warning(lambda text: print(text, file=sys.stderr))
+    renderer: mujoco.Renderer | None = None
+    for line in sys.stdin:
+        state = json.loads(line)
+        if state["scene"]:
+            if renderer:
+                renderer.close()
+            model = mujoco.MjModel.from_binary_path(state["scene"])
+            data = mujoco.MjData(model)
+            renderer = mujoco.Renderer(model, *state["size"])
+        data.qpos[:] = state["qpos"]
+        mujoco.mj_forward(model, data)
+        assert renderer is not None     # the first line names a scene
+        renderer.update_scene(data, camera=_camera(mujoco, state["camera"]))
+        images.write(renderer.render().tobytes())
+        images.flush()
+
+
 def _camera(mujoco, values):
     """A free camera of azimuth and elevation in degrees, distance in m and the point (3,) in m at its centre."""
     camera = mujoco.MjvCamera()
@@ -38,4 +68,4 @@ def _camera(mujoco, values):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1]) if sys.argv[1:] else serve()

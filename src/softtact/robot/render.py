@@ -5,19 +5,23 @@ drawn in another process, `python -m softtact.robot.offscreen FOLDER`. If that f
 no picture of the robot.
 """
 
+import json
 import os
+import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from softtact.drawing import drawn_apart
+from softtact.errors import InputError
 from softtact.outputs import temporary_folder
 from softtact.press.plot import save
+from softtact.processes import start_tied
 from softtact.robot.arm import JOINTS
 from softtact.robot.events import GraspRecord
 from softtact.robot.scene import MM, SENSOR_IN_TOOL, Scene, quaternion
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
 
 
 WHOLE, CLOSE = (60.0, -18.0, 1.9), (20.0, -20.0, 0.28)     # azimuth and elevation in degrees, distance in m
+_ABOVE_HAND = np.array([0.0, 0.0, 0.03])     # of the picture's middle, in m
+_COMMAND = (sys.executable, "-m", "softtact.robot.offscreen")
 _NO_PICTURE = "no picture of the robot: MuJoCo does not draw off screen here"
 
 
@@ -40,10 +46,63 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
     with temporary_folder() as folder:
         mujoco.mj_saveModel(scene.model, str(folder / "scene.mjb"), None)
         np.savez(folder / "states.npz", qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
-        environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
-        images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], folder, sentence=_NO_PICTURE,
-                             timeout_s=timeout_s, environment=environment)
+        images = drawn_apart(_COMMAND, folder, sentence=_NO_PICTURE, timeout_s=timeout_s, environment=_environment())
     return None if images is None else images["images"]
+
+
+def _environment():
+    return os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
+
+
+class Painter:
+    """Draws states of scenes one after the other, in one process that stays until `close`.
+
+    size: (height, width) of the images;  view: azimuth and elevation in degrees, distance in m, towards the hand
+    """
+
+    def __init__(self, *, size: tuple[int, int] = (480, 640), view: tuple[float, float, float] = CLOSE) -> None:
+        self._size, self._view = size, view
+        self._process: subprocess.Popen | None = None
+        self._scene: Scene | None = None
+
+    def draw(self, scene: Scene, data: Any) -> np.ndarray:
+        """Image (height, width, 3), uint8, of a scene in the state of a mujoco.MjData; InputError where MuJoCo cannot draw here."""
+        if self._process is None:
+            self._process = start_tied(_COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                       env=_environment())
+        hand = np.mean([data.site(f"sensor_{finger}").xpos for finger in SENSOR_IN_TOOL], axis=0)
+        state = {"qpos": data.qpos.tolist(), "size": self._size, "camera": [*self._view, *(hand + _ABOVE_HAND).tolist()]}
+        with temporary_folder() as folder:
+            another = scene is not self._scene
+            if another:
+                mujoco.mj_saveModel(scene.model, str(folder / "scene.mjb"), None)
+            image = self._answer(json.dumps(state | {"scene": str(folder / "scene.mjb") if another else None}))
+        self._scene = scene
+        return image
+
+    def _answer(self, line):
+        process, shape = self._process, (*self._size, 3)
+        try:
+            process.stdin.write(line.encode() + b"\n")
+            process.stdin.flush()
+            content = process.stdout.read(int(np.prod(shape)))
+        except BrokenPipeError:
+            content = b""
+        if len(content) < np.prod(shape):
+            reason = process.communicate()[1].decode(errors="replace").strip().splitlines() or ["without a message"]
+            self.close()
+            raise InputError(f"{_NO_PICTURE} ({reason[-1]:.200}); install EGL (on Debian libegl1, libegl-mesa0 and "
+                             "libgl1-mesa-dri), or leave render_mode out.")
+        return np.frombuffer(content, np.uint8).reshape(shape)
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            for stream in filter(None, (self._process.stdin, self._process.stdout, self._process.stderr)):
+                stream.close()
+        self._process = self._scene = None
 
 
 def state_of(scene: Scene, record: GraspRecord, row: int) -> np.ndarray:
@@ -66,7 +125,7 @@ def _camera(record, row, view):
     """A camera's six numbers: `view` and the point (3,) in m at its centre."""
     hand = record.sensor_pose_world[row, :, :3].mean(axis=0) * MM
     near = view[2] < 1.0
-    return [*view, *(hand + [0, 0, 0.03] if near else [0.35, 0.0, 0.35])]
+    return [*view, *(hand + _ABOVE_HAND if near else [0.35, 0.0, 0.35])]
 
 
 def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: np.ndarray | None) -> None:

@@ -22,7 +22,7 @@ from softtact.errors import InputError
 from softtact.progress import announce
 from softtact.robot.arm import HOME_RAD, JOINTS, add_arm
 from softtact.robot.events import FINGERS
-from softtact.robot.settings import SceneSettings
+from softtact.robot.settings import SceneSettings, number
 
 if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
@@ -88,9 +88,14 @@ def build_scene(mesh: trimesh.Trimesh, spec: "AnySpec", settings: SceneSettings,
     if not settings.mjcf and width >= settings.stroke_mm - 2 * spec.thickness_mm:
         raise InputError(f"The object is {width:g} mm wide along z, and the pads open to "
                          f"{settings.stroke_mm - 2 * spec.thickness_mm:g} mm; turn its mesh so that a narrower side lies along z.")
-    mass = mass_kg if mass_kg is not None else abs(mesh.volume) * MM**3 * settings.density_kg_m3
+    mass = abs(mesh.volume) * MM**3 * settings.density_kg_m3 if mass_kg is None else mass_of(mass_kg)
     _add_object(robot, mesh, settings, placement, mass)
     return Scene(model=robot.compile(), settings=settings, mass_kg=float(mass), width_mm=width)
+
+
+def mass_of(mass_kg: Any) -> float:
+    """The mass of an object in kg, checked."""
+    return number("mass_kg", mass_kg, low=1e-6, high=100.0, unit="kg")
 
 
 def _warn(text):

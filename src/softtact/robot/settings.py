@@ -3,6 +3,7 @@
 The defaults are in `softtact/robot/data/scene.yaml`; a user's file states some of its keys.
 """
 
+import math
 import os
 from importlib import resources
 from pathlib import Path
@@ -78,6 +79,18 @@ def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
         reason = (f"the key is unknown; use one of {', '.join(SceneSettings.model_fields)}." if fault["type"] == "extra_forbidden"
                   else f"{fault['input']!r} is not usable: {fault['msg']}; correct it.")
         raise InputError(f"{path or 'scene'}, at '{field}': {reason}") from None
+
+
+def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.inf, unit: str = "") -> float:
+    """A setting as a finite number within limits; InputError that names the setting, its value and the limits."""
+    try:
+        found = math.nan if isinstance(value, str | bytes | bool) else float(value)
+    except (TypeError, ValueError):
+        found = math.nan
+    if not (math.isfinite(found) and low <= found <= high):
+        limits = f" from {low:g} to {high:g}" if math.isfinite(high) else ""
+        raise InputError(f"{name}={value!r}: give a finite number{limits}{f' ({unit})' * bool(unit)}.")
+    return found
 
 
 def import_mujoco() -> None:

@@ -42,7 +42,9 @@ class Elastomer(FiniteSection):
     def strain(self, stress_mpa: float) -> float:
         """Compressive strain at a stress in MPa, with an `ExtrapolationWarning` outside of the test.
 
-        Raises InputError beyond twice the highest tested stress, and where the polynomial gives no strain above zero.
+        Below the lowest tested stress it is proportional to the stress: the polynomial does not pass through zero, and would give
+        some per cent without any stress. Raises InputError beyond twice the highest tested stress, and where the polynomial gives
+        no strain above zero.
         """
         low, high = self.tested_mpa
         if stress_mpa > _BEYOND * high:
@@ -50,16 +52,17 @@ class Elastomer(FiniteSection):
                 f"elastomer {self.name}: its curve was tested up to {1e3 * high:.3g} kPa, and {1e3 * stress_mpa:.3g} kPa is "
                 "beyond twice that; choose less pressure or a stiffer elastomer."
             )
-        strain = float(self.fit(stress_mpa))
-        if strain <= 0:
+        strain = float(self.fit(stress_mpa)) if stress_mpa >= low else float(self.fit(low)) * stress_mpa / low
+        if strain <= 0 or low == 0:
             raise InputError(
-                f"elastomer {self.name}: its curve has a strain of {strain:.2%} at {1e3 * stress_mpa:.3g} kPa, below its test "
-                f"from {1e3 * low:.3g} kPa on; choose more pressure."
+                f"elastomer {self.name}: its curve has a strain of {strain:.2%} at {1e3 * stress_mpa:.3g} kPa and "
+                f"{float(self.fit(0.0)):.2%} without stress; correct strain_percent."
             )
         if not low <= stress_mpa <= high:
+            beyond = "its curve is extrapolated" if stress_mpa > high else "its modulus is held as at the lowest tested stress"
             warnings.warn(
                 f"elastomer {self.name}: {1e3 * stress_mpa:.3g} kPa is outside of its test from {1e3 * low:.3g} to "
-                f"{1e3 * high:.3g} kPa (strains of 5 to 30 %, 55 kPa at most), so that its curve is extrapolated.",
+                f"{1e3 * high:.3g} kPa (strains of 5 to 30 %, 55 kPa at most), so that {beyond}.",
                 ExtrapolationWarning,
                 stacklevel=2,
             )
@@ -70,10 +73,10 @@ class Elastomer(FiniteSection):
         return stress_mpa / self.strain(stress_mpa)
 
     def tested_young_mpa(self, stress_mpa: float) -> float:
-        """`young_mpa`, constant below the lowest tested stress, because the fits do not pass through zero; without warnings."""
+        """`young_mpa` without warnings."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ExtrapolationWarning)
-            return self.young_mpa(max(stress_mpa, self.tested_mpa[0]))
+            return self.young_mpa(stress_mpa)
 
     def fit(self, stress_mpa: Any) -> Any:
         """The polynomial's strain at a stress or an array of stresses, within the test and outside."""

@@ -58,7 +58,7 @@ def disc(centre_mm: tuple[float, float], *, diameter_mm: float, pressure_mpa: fl
 
 
 def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, pressure_mpa: float) -> Load:
-    """Uniform pressure where a picture is dark, as a fingerprint in ink on white paper.
+    """Uniform pressure where a picture is dark, as a fingerprint in ink on white paper; what is transparent does not press.
 
     The mean of the dark pixels lies at centre_mm; rows of the picture run downwards, y upwards.
     Raises InputError where the file is no picture, or has no dark pixel.
@@ -68,18 +68,33 @@ def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, p
     check_input(path, "picture", missing="there is no such picture; correct the load's `mask`.")
     with in_one_sentence(path, "not a readable picture", "save the mask as PNG"), Image.open(path) as picture:
         check_limit(path, "pixels", picture.width * picture.height)
-        grey = np.asarray(picture.convert("L"))
+        grey, partly = _on_white(picture)
     row, column = np.nonzero(grey < 128)
     if not len(row):
-        raise InputError(f"{path}: no pixel is dark, so that nothing presses; draw the contact area in black on white.")
+        light = "no pixel that is seen is dark, and what is transparent does not press" if partly else "no pixel is dark"
+        raise InputError(f"{path}: {light}, so that nothing presses; draw the contact area in black on white.")
     points = pixel_mm * np.column_stack([column, -row])
     area = len(row) * pixel_mm**2
     return Load(
         points - points.mean(axis=0) + centre_mm,
         np.full(len(row), pressure_mpa * pixel_mm**2),
         pressure_mpa,
-        f"{1e3 * pressure_mpa:g} kPa on the mask {Path(path).name} ({area:.4g} mm2) at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm",
+        f"{1e3 * pressure_mpa:g} kPa on the mask {Path(path).name} ({area:.4g} mm2{', without what is transparent' * partly}) at "
+        f"({centre_mm[0]:g}, {centre_mm[1]:g}) mm",
     )
+
+
+def _on_white(picture):
+    """Grey values (row, column), 0 to 255, of a picture on white paper, and whether a part of it is transparent."""
+    from PIL import Image
+
+    if picture.mode.startswith("I"):     # 16 bits a pixel, which Pillow would cut off at 255
+        return np.asarray(picture) // 257, False
+    if not picture.has_transparency_data:
+        return np.asarray(picture.convert("L")), False
+    coloured = picture.convert("RGBA")
+    paper = Image.new("RGBA", picture.size, "white")
+    return np.asarray(Image.alpha_composite(paper, coloured).convert("L")), coloured.getextrema()[3][0] < 255
 
 
 def refuse_beside(load: Load, layout: Layout, *, where: str) -> None:
