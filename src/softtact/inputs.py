@@ -42,6 +42,7 @@ LIMITS = {
     "arrays": Limit(4e9, "bytes", "a file of arrays (unpacked)"),
     "picture": Limit(1e9, "bytes", "a picture file"),
     "pixels": Limit(100e6, "pixels", "a picture"),
+    "bag": Limit(4e9, "bytes", "a file of a ROS 2 bag"),
     "movie": Limit(20e9, "bytes", "a movie, or images in one file"),
 }
 

@@ -97,7 +97,7 @@ def test_view_plays_a_recording(folder, capsys, name):
 @pytest.mark.parametrize(("line", "sentence"), [
     ("view bar.csv --page p.html", "--page p.html: a recording is drawn as .png, .gif or .mp4"),
     ("view bar.csv --save p.svg", "p.svg: the file is written as .png or .gif or .mp4"),
-    ("view press.nc --force-log bar_force.csv --save p.png", "--force-log and --baseline have an effect only on the .csv"),
+    ("view press.nc --force-log bar_force.csv --save p.png", "--force-log, --baseline and --topic have an effect only on a rec"),
     ("view plate.stl.csv --save p.png", "plate.stl.csv: there is no such file"),
 ])
 def test_view_refuses_what_it_cannot_play(folder, capsys, line, sentence):

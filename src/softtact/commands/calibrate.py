@@ -19,16 +19,19 @@ EXAMPLES = """
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "calibrate", _calibrate, "Calibrate a sensor from recordings of known presses.", EXAMPLES)
-    command.add_argument("recordings", metavar="RECORDING.csv", type=Path, nargs="+",
-                         help="recordings of the maker's recorder, one press each")
+    command.add_argument("recordings", metavar="RECORDING", type=Path, nargs="+",
+                         help="recordings of the maker's recorder (.csv), or ROS 2 bags (.mcap, folder), one press each")
     command.add_argument("--press", action="append", required=True, type=Path, metavar="OBJECT.stl",
                          help="what was pressed, lowest side down: one for all recordings, or one for each")
     add_unit(command)
-    command.add_argument("--force", action="append", required=True, metavar="N|FILE.csv",
-                         help="N of a weight that is laid on and held, or a log with time_s and force_n; one for all, or for each")
+    command.add_argument("--force", action="append", required=True, metavar="N|FILE",
+                         help="N of a weight that is laid on and held, a log with time_s and force_n, or a ROS 2 bag (may be that "
+                              "of the taxels); one for all, or for each")
     command.add_argument("--place", action="append", metavar="x,y,angle",
                          help="where the object lay over the sensor's middle, mm and degrees (default: 0,0,0); one for all, or for "
                               "each")
+    command.add_argument("--topic", action="append", metavar="/NAME",
+                         help="of a bag: the topic of the taxels, or of the force, where several fit; repeat it")
     command.add_argument("--finger", type=int, choices=(0, 1), default=0, help="which finger was pressed (default: 0)")
     command.add_argument("--baseline", choices=("auto", "subtracted", "kept"), default="auto",
                          help="how the recorder wrote it (default: found from the lowest readings)")
@@ -134,15 +137,12 @@ def _experiment(path, mesh, force, place, options, spec):
     from softtact.calibration.experiment import experiment
     from softtact.readout.checks.finding import left_out, refuse_unsafe, zeroed
     from softtact.readout.checks.recording import check_recording
-    from softtact.readout.recording import with_force
-    from softtact.readout.tsf85 import read_recording
+    from softtact.readout.sources import recording_of, with_force_of
 
-    recording = read_recording(path, baseline=options.baseline)
-    if "counts" not in recording:
-        raise InputError(f"{path}: it has nodes of a simulation but no counts; give a recording of the sensor.")
+    recording = recording_of(path, baseline=options.baseline, topics=options.topic or ())
     held = float(force) if _is_number(force) else None
     if held is None:
-        recording = with_force(recording, force)
+        recording = with_force_of(recording, force, topics=options.topic or ())
     found = [one for one in check_recording(recording, largest=spec.largest_counts) if options.finger in one.fingers]
     refuse_unsafe(found)
     if held is None:
@@ -154,7 +154,7 @@ def _experiment(path, mesh, force, place, options, spec):
                          "is it in grams or another unit? Give it in newtons.")
     made = experiment(recording, mesh, finger=options.finger, force_n=held, place=place, largest_counts=spec.largest_counts,
                       left_out=left_out(recording, found))
-    return made, [one.sentence for one in found]
+    return made, [*recording.attrs.get("notes", ()), *(one.sentence for one in found)]
 
 
 def _notes(problem, checks):

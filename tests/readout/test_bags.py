@@ -1,0 +1,127 @@
+"""Recordings in ROS 2 bags: what is written is read back; topics, stamps and damage are told."""
+
+import numpy as np
+import pytest
+from support.sound_recordings import ramp
+
+from softtact.errors import InputError
+from softtact.readout.bags import read_bag, with_force_of_bag, write_bag
+from softtact.readout.sources import with_force_of
+
+rosbags = pytest.importorskip("rosbags.rosbag2")
+typesys = pytest.importorskip("rosbags.typesys")
+
+
+@pytest.fixture
+def press():
+    return ramp().recording().isel(time=slice(30, 120)).assign_attrs(start_ms=1_764_000_000_123)
+
+
+@pytest.mark.parametrize("name", ["r.mcap", "r.rosbag2"])
+def test_what_is_written_is_read_back(tmp_path, press, name):
+    write_bag(tmp_path / name, press)
+    again = with_force_of_bag(read_bag(tmp_path / name), tmp_path / name)
+    assert (again.counts.values == press.counts.values).all() and (again.baseline.values == press.baseline.values).all()
+    assert again.force_n.values == pytest.approx(press.force_n.values)
+    assert again.time.values == pytest.approx(press.time.values - press.time.values[0], abs=1e-6)
+    assert "/tactile/static_data (robotiq_tsf/msg/StaticData), times from the bag (time of receipt)" in again.attrs["notes"][0]
+
+
+def test_forces_of_each_finger_have_a_topic_each(tmp_path, press):
+    press.force_n[:, 1] = 0.5 * press.force_n[:, 1] + 1
+    write_bag(tmp_path / "r.mcap", press)
+    again = with_force_of_bag(read_bag(tmp_path / "r.mcap"), tmp_path / "r.mcap")
+    assert again.force_n.values == pytest.approx(press.force_n.values)
+
+
+def test_counts_that_are_not_whole_are_kept_as_an_array(tmp_path, press):
+    press = press.assign(counts=press.counts + 0.5)
+    write_bag(tmp_path / "r.mcap", press)
+    again = read_bag(tmp_path / "r.mcap")
+    assert again.counts.values == pytest.approx(press.counts.values) and "Float32MultiArray" in again.attrs["notes"][0]
+
+
+def bag_of(path, messages, *, definitions=()):
+    """An MCAP file of (topic, type, time in ns, function of the types)."""
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    for name, text in definitions:
+        store.register(typesys.get_types_from_msg(text, name))
+    with rosbags.Writer(path.with_suffix(""), version=9, storage_plugin=rosbags.StoragePlugin.MCAP) as writer:
+        connections = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in
+                       dict.fromkeys((topic, kind) for topic, kind, _, _ in messages)}
+        for topic, kind, time, made in messages:
+            writer.write(connections[topic], time, store.serialize_cdr(made(store.types), kind))
+    (path.with_suffix("") / path.name).rename(path)
+    return path
+
+
+def array(values):
+    return lambda types: types["std_msgs/msg/Int32MultiArray"](
+        layout=types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0), data=np.asarray(values, np.int32))
+
+
+def test_any_message_with_as_many_numbers_is_read_and_its_own_stamps_are_taken(tmp_path):
+    def message(stamp):
+        return lambda types: types["lab_msgs/msg/Pad"](
+            header=types["std_msgs/msg/Header"](stamp=types["builtin_interfaces/msg/Time"](sec=stamp, nanosec=5), frame_id="pad"),
+            gain=np.ones(3), cells=np.arange(28, dtype=np.int16) + 100 * stamp)
+
+    definition = ("lab_msgs/msg/Pad", "std_msgs/Header header\nfloat64[3] gain\nint16[28] cells")
+    path = bag_of(tmp_path / "pad.mcap", [("/pad", "lab_msgs/msg/Pad", 10**9 + k, message(k + 1)) for k in range(3)],
+                  definitions=[definition])
+    one = read_bag(path, baseline="subtracted")
+    assert one.counts.shape == (3, 1, 7, 4) and one.counts.values[2, 0, 1, 1] == 305
+    assert one.time.values == pytest.approx([0, 1, 2]) and "times from the messages' headers" in one.attrs["notes"][0]
+
+
+def test_raw_readings_without_a_baseline_take_that_of_the_first_frames(tmp_path):
+    frames = [9000 + np.arange(56) + (500 if k > 20 else 0) for k in range(40)]
+    one = read_bag(bag_of(tmp_path / "raw.mcap", [("/t", "std_msgs/msg/Int32MultiArray", 10**7 * (k + 1), array(frame))
+                                                  for k, frame in enumerate(frames)]))
+    assert (one.baseline.values.ravel() == frames[0]).all() and set(np.unique(one.counts.values)) == {0, 500}
+    assert "the baseline is the median of the first 10" in one.attrs["notes"][0]
+
+
+def test_several_topics_are_told_and_one_is_named(tmp_path):
+    path = bag_of(tmp_path / "two.mcap", [(topic, "std_msgs/msg/Int32MultiArray", k + 1, array([k] * 28))
+                                          for k in range(3) for topic in ("/left", "/right")])
+    with pytest.raises(InputError, match=r"two.mcap: several topics have taxels .*: /left, /right; name one \(--topic\)"):
+        read_bag(path)
+    assert "/right" in read_bag(path, topics=["/right"]).attrs["notes"][0]
+    with pytest.raises(InputError, match="it has no topic '/up'; name one of /left, /right"):
+        read_bag(path, topics=["/up"])
+    with pytest.raises(InputError, match="none of its topics, /left, /right, has a force"):
+        with_force_of(read_bag(path, topics=["/left"]), path)
+
+
+
+
+@pytest.mark.parametrize(("change", "sentence"), [
+    (lambda raw: b"", "seems to be empty"),
+    (lambda raw: raw[:len(raw) // 2], "File end magic is invalid"),
+    (lambda raw: b"PK" + raw[2:], "File magic is invalid"),
+    (lambda raw: raw[:400] + bytes(200) + raw[600:], "could be read, so it is damaged"),
+])
+def test_a_damaged_file_is_refused_in_one_sentence(tmp_path, press, change, sentence):
+    write_bag(tmp_path / "r.mcap", press)
+    (tmp_path / "r.mcap").write_bytes(change((tmp_path / "r.mcap").read_bytes()))
+    with pytest.raises(InputError, match="recover") as refused:
+        read_bag(tmp_path / "r.mcap")
+    assert sentence in str(refused.value) and str(refused.value).count("r.mcap") <= 2
+
+
+def test_a_bag_without_a_message_is_refused(tmp_path):
+    with rosbags.Writer(tmp_path / "empty", version=9) as writer:
+        writer.add_connection("/t", "std_msgs/msg/Int32MultiArray", typestore=typesys.get_typestore(typesys.Stores.ROS2_HUMBLE))
+    with pytest.raises(InputError, match="empty: it holds no message; record again"):
+        read_bag(tmp_path / "empty")
+    (tmp_path / "empty" / "metadata.yaml").unlink()
+    with pytest.raises(InputError, match="has no metadata.yaml, so it is no rosbag2"):
+        read_bag(tmp_path / "empty")
+
+
+def test_another_compression_is_named(tmp_path, monkeypatch):
+    path = bag_of(tmp_path / "c.mcap", [("/t", "std_msgs/msg/Int32MultiArray", 1, array([0] * 28))])
+    monkeypatch.delitem(pytest.importorskip("rosbags.rosbag2.storage_mcap").DECOMPRESSORS, "")
+    with pytest.raises(InputError, match="Unsupported chunk compression"):
+        read_bag(path)
