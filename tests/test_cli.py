@@ -24,6 +24,7 @@ from softtact.commands import press as press_command
 from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
 from softtact.errors import ConvergenceError, InputError, OutputError, WorkerError
 from softtact.exits import EXIT_STATUS
+from softtact.materials.prony import PronySeries
 from softtact.materials.readers import LAYOUTS
 from softtact.press.result import read_press
 from softtact.press.sensor import MODELS, Sensor
@@ -106,6 +107,14 @@ def example_files(tmp_path, monkeypatch):
         mesh.copy().apply_scale(scale).export(tmp_path / name)
     neo_hooke_file(tmp_path / "tension.csv", (0.8, 0.9, 1.1, 1.3, 1.4))
     neo_hooke_file(tmp_path / "shear.csv", (1.1, 1.3, 1.5), exponents=(1, -3))
+    up, down = np.linspace(1, 1.5, 12), np.linspace(1.49, 1.01, 12)
+    softer = 0.4 * (down - down**-2) * (1 - 0.3 * (1.5 - down) / 0.5)
+    cycles = np.column_stack([np.concatenate([up, down]), np.concatenate([0.4 * (up - up**-2), softer])])
+    np.savetxt(tmp_path / "cycles.csv", cycles, delimiter=",", header="stretch,nominal_stress_mpa", comments="")
+    times, series = np.geomspace(0.01, 10, 15), PronySeries((0.3,), (0.5,))
+    for name, header, values in (("relaxation", "time_s,force_n", [series.relaxation(times)]),
+                                 ("dma", "frequency_hz,storage_modulus_mpa,loss_modulus_mpa", series.storage_loss(times))):
+        np.savetxt(tmp_path / f"{name}.csv", np.column_stack([times, *values]), delimiter=",", header=header, comments="")
     rows = [f"{x:.2f};{400 * (x - x**-2):.3f}\n" for x in np.linspace(1, 1.8, 9)]
     (tmp_path / "machine.csv").write_text("Test 7\nOperator: X\nstretch;Spannung\n" + "".join(rows).replace(".", ","))
     (tmp_path / "my_sensor.yaml").write_text(sensor_file("coro").read_text())

@@ -26,6 +26,7 @@ from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import cylinder
 from softtact.imaging.frames import Camera, render_frame
 from softtact.learning.network import TactileNetwork, save_network
+from softtact.materials.prony import PronySeries
 from softtact.readout.tsf85 import write_recording
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -79,6 +80,13 @@ def desk(tmp_path_factory):
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="Strain [%],Stress", comments="")
     table = np.column_stack([25 * (stretch - 1), 20 * 0.35 * curves["tension"]])
     np.savetxt(folder / "forces.csv", table, delimiter=",", header="Extension [mm],Force [N]", comments="")
+    back = stretch[::-1][1:]
+    cycles = np.column_stack([np.concatenate([stretch, back]), 0.35 * np.concatenate([curves["tension"], 0.7 * (back - back**-2)])])
+    np.savetxt(folder / "cycles.csv", cycles, delimiter=",", header="stretch,nominal_stress_mpa", comments="")
+    times, series = np.geomspace(0.01, 10, 15), PronySeries((0.3,), (0.5,))
+    for name, header, values in (("relaxation", "time_s,force_n", [series.relaxation(times)]),
+                                 ("dma", "frequency_hz,storage_modulus_mpa,loss_modulus_mpa", series.storage_loss(times))):
+        np.savetxt(folder / f"{name}.csv", np.column_stack([times, *values]), delimiter=",", header=header, comments="")
     rows = [f"{x:.4f};{350 * y:.3f}" for x, y in zip(stretch, curves["tension"], strict=True)]
     machine = ["Test 7", "Operator: X", "Streckung;Spannung", "-;kPa", *(row.replace(".", ",") for row in rows)]
     (folder / "machine.csv").write_text("\n".join([*machine, ""]))

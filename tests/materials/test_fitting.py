@@ -6,9 +6,10 @@ from table1 import TABLE_1
 
 from softtact.errors import InputError
 from softtact.materials.curves import synthetic_curve
-from softtact.materials.fitting import _unseen, collect, errors_of, fit_law, law_names, rms
+from softtact.materials.fitting import collect, errors_of, fit_law, law_names, rms
 from softtact.materials.laws.registry import LAWS, make_law
 from softtact.materials.readers import read_curves
+from softtact.materials.uncertainty import unseen
 
 TRUTH = {
     "neo_hooke": {"c10": 0.18},
@@ -86,9 +87,9 @@ def test_constants_that_the_curves_cannot_tell_apart_have_no_covariance(curves_o
 def test_a_constant_of_small_effect_is_not_taken_for_an_unseen_one():
     """Columns of sizes 1 and 1e-6 that do not depend on each other, and two that do beside one that does not."""
     points = np.array([1.0, 2.0, 3.0, 4.0])
-    assert _unseen(np.column_stack([points, 1e-6 * points**2])).tolist() == [False, False]
-    assert _unseen(np.column_stack([points, 1e-6 * points, points**2])).tolist() == [True, True, False]
-    assert _unseen(np.column_stack([points, 0 * points])).tolist() == [False, True]
+    assert unseen(np.column_stack([points, 1e-6 * points**2])).tolist() == [False, False]
+    assert unseen(np.column_stack([points, 1e-6 * points, points**2])).tolist() == [True, True, False]
+    assert unseen(np.column_stack([points, 0 * points])).tolist() == [False, True]
 
 
 def test_constants_that_the_curves_do_not_hold_are_named(curves_of):

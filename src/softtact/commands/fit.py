@@ -13,6 +13,9 @@ EXAMPLES = """
   softtact fit uniaxial=tension.csv planar=shear.csv --law all --out card.json --plot card.png
   softtact fit uniaxial=tension.csv --law neo_hooke,yeoh --window uniaxial=0.8:1.4 --out card.json
   softtact fit uniaxial=machine.csv --decimal , --skip-rows 2 --column nominal_stress_kpa=Spannung --law yeoh --out card.json
+  softtact fit uniaxial=cycles.csv --cycles mullins --law yeoh --out card.json
+  softtact fit uniaxial=tension.csv relaxation=relaxation.csv frequency=dma.csv --moduli relaxed --law yeoh --out card.json
+  softtact fit relaxation=relaxation.csv --prony 3 --card card.json --out relaxing.json
   softtact fit polyurethane --out card.json      # a material that ships, or config/materials/NAME.yaml
 """
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
@@ -35,6 +38,16 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--weight", action="append", metavar="MODE=W", help="weight of a mode's squared errors; repeat it")
     command.add_argument("--nonnegative", action="store_true", default=None, help="keep constants in MPa from being negative")
     command.add_argument("--small-strain", type=float, metavar="E", help="strain up to which E is the slope (default: 0.1)")
+    inelastic = command.add_argument_group("softening and relaxation")
+    inelastic.add_argument("--cycles", choices=("first", "steady", "mullins"),
+                           help="of tests with unloading: fit laws to first loading, or to the last loading of steady cycles; "
+                                "mullins fits first loading, and the Mullins effect to the other rows")
+    inelastic.add_argument("--prony", type=int, metavar="N",
+                           help="terms of the Prony series of relaxation=FILE and frequency=FILE (default: by the data)")
+    inelastic.add_argument("--moduli", choices=("instantaneous", "relaxed"),
+                           help="what the laws' constants are beside a Prony series (default: as --holds, else instantaneous)")
+    inelastic.add_argument("--card", type=Path, metavar="CARD.json",
+                           help="card to which a Prony series is added, without other curves")
     reading = command.add_argument_group("how the files are read")
     reading.add_argument("--mode", choices=("uniaxial", "equibiaxial", "planar", "simple_shear", "volumetric"),
                          help="test mode of all the files (default: as each file or its name says)")
@@ -55,28 +68,114 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _fit(options):
-    from softtact.materials.card_making import make_card, misfit_warnings
+    from softtact.materials.card_making import misfit_warnings
     from softtact.materials.cards import write_card
-    from softtact.materials.making import curves_of
-    from softtact.materials.readers import read_curves
 
     check_outputs(options.out, options.plot)
     config = _material(options)
-    refuse_overwriting(_inputs(options, config), {"--out": options.out, "--plot": options.plot})
-    if config is not None:
-        curves, settings = curves_of(config.curve_settings), config.fit_settings
-    else:
-        curves, settings = read_curves(options.curves, window=_windows(options), **_reading(options)), {}
-    _refuse_idle(options, curves, settings)
-    card = make_card(curves, **settings | _fit_settings(options))
+    shape, timed = _parted(options)
+    refuse_overwriting(_inputs(options, config, shape, timed), {"--out": options.out, "--plot": options.plot})
+    prony = _prony_fit(options, timed)
+    card, curves, tests = _elastic(options, config, shape)
+    told = [*(misfit_warnings(card) if curves else ()), *(remark for curve in curves for remark in curve.remarks)]
+    for name, found in (("mullins", _mullins_fit(options, card, tests)), ("prony", prony)):
+        if found is not None:
+            others = [text for text in card.get("warnings", []) if not text.startswith(f"{name}:")]
+            card |= {name: found.entry(), "warnings": [*others, *found.warnings]}
+            told += found.warnings
     write_card(options.out, card)
     if options.plot:
         from softtact.studies.hybrid.figures.material_plot import plot_material
 
-        plot_material(card, curves, options.plot)
-    show(card, as_json=options.json, lines=[*_fit_lines(card), f"written: {options.out}"])
-    for warning in [*misfit_warnings(card), *(remark for curve in curves for remark in curve.remarks)]:
+        plot_material(card, curves, options.plot, cycles=tests, over_time=prony.tests if prony else ())
+    lines = _fit_lines(card) if curves else [*_inelastic_lines(card), *prony.warnings]
+    show(card, as_json=options.json, lines=[*lines, f"written: {options.out}"])
+    for warning in told:
         print(f"softtact fit: WARNING: {warning}", file=sys.stderr)
+
+
+def _elastic(options, config, shape):
+    """(card, curves, cyclic tests): fitted to the files of shape or to a material, or read from --card."""
+    from softtact.materials.card_making import make_card
+    from softtact.materials.cards import load_card
+    from softtact.materials.making import curves_of
+    from softtact.materials.readers import read_curves, read_cycles
+
+    if config is None and not shape:
+        return load_card(options.card), [], []
+    tests, settings = [], {}
+    if config is not None:
+        curves, settings = curves_of(config.curve_settings), config.fit_settings
+    elif options.cycles:
+        curves, tests = read_cycles(shape, cycles=options.cycles, window=_windows(options), **_reading(options))
+    else:
+        curves = read_curves(shape, window=_windows(options), **_reading(options))
+    _refuse_idle(options, curves, settings)
+    return make_card(curves, **settings | _fit_settings(options)), curves, tests
+
+
+def _parted(options):
+    """(files of shape, [(file, mode)] of tests over time). Options that have no effect on these are refused."""
+    modes = [_time_mode(text) for text in options.curves]
+    timed = [(text.removeprefix(f"{mode}="), mode) for text, mode in zip(options.curves, modes, strict=True) if mode]
+    shape = [text for text, mode in zip(options.curves, modes, strict=True) if mode is None]
+    idle = next((name for name in ("prony", "moduli", "card") if getattr(options, name) is not None), None)
+    if not timed and idle:
+        raise InputError(f"--{idle}: it has no effect without a test over time; add relaxation=FILE or frequency=FILE, or leave it "
+                         "out.")
+    if not timed:
+        return shape, []
+    if shape and options.card is not None:
+        raise InputError(f"--card {options.card}: a new card is fitted to {shape[0]}; leave one of the two out.")
+    if not shape:
+        _refuse_without_shape(options)
+    return shape, timed
+
+
+def _time_mode(text):
+    """The mode of a test over time, stated as MODE=FILE or by the file's name; None for other arguments."""
+    from softtact.materials.time_tests import TIME_MODES
+
+    head, equals, _ = text.partition("=")
+    return next((mode for mode in TIME_MODES if (head if equals else Path(text).stem) == mode), None)
+
+
+def _refuse_without_shape(options):
+    """Refuse tests over time without a card, and options of laws and curves that have no effect on them."""
+    if options.card is None:
+        raise InputError(f"{options.curves[0]}: a test over time holds no law; add a curve such as uniaxial=FILE, or name the "
+                         "card to which the Prony series belongs (--card).")
+    free = ("columns", "decimal", "skip_rows", "sheet")
+    idle = [name for name, value in _READING.items() if name not in free and getattr(options, name) != value]
+    idle += [name for name in ("cycles", "law", "choose", "material", "poisson", "bulk_over_shear", "window", "residual", "weight",
+                               "nonnegative", "small_strain") if getattr(options, name) is not None]
+    if idle:
+        raise InputError(f"--{idle[0].replace('_', '-')}: it has no effect on a Prony series that is added to a card; leave it "
+                         "out.")
+
+
+def _prony_fit(options, timed):
+    """`PronyFit` of the tests over time; None without any."""
+    from softtact.materials.prony_fitting import fit_prony
+    from softtact.materials.time_tests import read_time_tests
+
+    if not timed:
+        return None
+    if options.holds is not None and options.moduli not in (None, options.holds):
+        raise InputError(f"--moduli {options.moduli}: the curve is the {options.holds} one by --holds; state the same in both.")
+    tests = read_time_tests(timed, columns=dict(pairs("--column", options.column)), decimal=options.decimal,
+                            skip_rows=options.skip_rows, sheet=options.sheet)
+    return fit_prony(tests, terms=options.prony, moduli=options.moduli or options.holds or "instantaneous")
+
+
+def _mullins_fit(options, card, tests):
+    """`MullinsFit` of the chosen law; None unless asked for."""
+    from softtact.materials.cards import law_of_entry
+    from softtact.materials.cycles import fit_mullins
+
+    if options.cycles != "mullins":
+        return None
+    return fit_mullins(law_of_entry(card["chosen"], card["laws"][card["chosen"]]), tests)
 
 
 def _material(options):
@@ -87,19 +186,20 @@ def _material(options):
     name = options.curves[0]
     if Path(name).suffix not in YAML and (name not in known_names("materials") or Path(name).exists()):
         return None
-    if len(options.curves) > 1 or _reading(options) != _READING:
+    if len(options.curves) > 1 or _reading(options) != _READING or options.cycles is not None:
         raise InputError(f"{name}: a material's YAML names its files and options; give it without others.")
     return load_material(material_file(name))
 
 
-def _inputs(options, config):
+def _inputs(options, config, shape, timed):
     """The input files."""
     from softtact.materials.readers import stated_files
     from softtact.sensors.library import material_file
 
     if config is not None:
         return [material_file(options.curves[0]), *config.measured_files]
-    return [path for path, _ in stated_files(options.curves, mode=options.mode, layout=options.layout)]
+    found = [path for path, _ in [*stated_files(shape, mode=options.mode, layout=options.layout), *timed]]
+    return [*found, *([options.card] if options.card else [])]
 
 
 _READING: dict[str, Any] = {"mode": None, "layout": "plain", "columns": {}, "sort": False, "compression": False, "decimal": ".",
@@ -108,8 +208,16 @@ _READING: dict[str, Any] = {"mode": None, "layout": "plain", "columns": {}, "sor
 
 def _reading(options):
     """The arguments of `read_curves`."""
-    return {name: getattr(options, name) for name in _READING if name != "columns"} | {
-        "columns": dict(pairs("--column", options.column))}
+    of_time = _of_time_tests() if any(_time_mode(text) for text in options.curves) else set()
+    columns = {name: header for name, header in pairs("--column", options.column) if name not in of_time}
+    return {name: getattr(options, name) for name in _READING if name != "columns"} | {"columns": columns}
+
+
+def _of_time_tests():
+    """Names of columns that only tests over time have."""
+    from softtact.materials.columns import FREQUENCIES, LOSS, STORAGE, TIMES
+
+    return {*TIMES, *FREQUENCIES, *STORAGE, *LOSS, "time", "frequency", "storage_modulus", "loss_modulus"}
 
 
 def _refuse_idle(options, curves, settings):
@@ -148,7 +256,19 @@ def _fit_lines(card):
         yield (f"{name:20}{law['rmse_mpa']:11.4g}{law['relative_error']:10.1%}{_left_out(law):>10}{law['mu0_mpa']:10.4g}"
                f"  {ranges}{note}")
     yield f"bulk modulus: {card['bulk_source']}"
+    yield from _inelastic_lines(card)
     yield from card["warnings"]
+
+
+def _inelastic_lines(card):
+    """Lines on the Mullins effect and the Prony series of a card."""
+    if mullins := card.get("mullins"):
+        yield (f"Mullins effect of {mullins['law']}: r {mullins['r']:.4g}, m {mullins['m_mpa']:.4g} MPa, beta "
+               f"{mullins['beta']:.4g}; relative error {mullins['relative_error']:.1%}")
+    if prony := card.get("prony"):
+        yield (f"Prony series: g {', '.join(f'{g:.4g}' for g in prony['g'])} of the instantaneous modulus, tau "
+               f"{', '.join(f'{tau:.4g}' for tau in prony['tau_s'])} s; relative error {prony['relative_error']:.1%}; the laws' "
+               f"constants are {prony['moduli']}")
 
 
 def _left_out(law):

@@ -21,9 +21,12 @@ MEGAPASCALS = {"mpa": 1.0, "kpa": 1e-3, "pa": 1e-6, "gpa": 1e3, "bar": 0.1, "psi
                "kgf_cm2": _KGF_N / 100, "kgf_mm2": _KGF_N}
 NEWTONS = {"n": 1.0, "mn": 1e-3, "kn": 1e3, "gf": 1e-3 * _KGF_N, "kgf": _KGF_N, "lbf": _POUND_N}
 MILLIMETRES = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1e3, "in": _INCH_MM}
-# Quantity whose name has no unit -> its units, factors to MPa, N or mm.
-BASES = dict.fromkeys(("nominal_stress", "true_stress", "shear_stress", "pressure"), MEGAPASCALS) | {
-    "force": NEWTONS, "extension": MILLIMETRES}
+SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+HERTZ = {"hz": 1.0, "khz": 1e3, "rad_s": 1 / (2 * math.pi)}
+# Quantity whose name has no unit -> its units, factors to MPa, N, mm, s or Hz.
+BASES = dict.fromkeys(("nominal_stress", "true_stress", "shear_stress", "pressure", "relaxation_modulus", "storage_modulus",
+                       "loss_modulus"), MEGAPASCALS) | {
+    "force": NEWTONS, "extension": MILLIMETRES, "time": SECONDS, "frequency": HERTZ}
 _PERCENT = {name: f"{name}_percent" for name in ("engineering_strain", "volumetric_strain", "shear_strain")}
 # A unit as it is written -> its name above. Case matters: mPa is not MPa.
 _WRITTEN = {
@@ -31,6 +34,7 @@ _WRITTEN = {
     "psi": "psi PSI lbf/in2 lb/in2 lbs/in2", "ksi": "ksi KSI", "n_cm2": "N/cm2", "kgf_cm2": "kgf/cm2 kg/cm2 kp/cm2",
     "kgf_mm2": "kgf/mm2 kg/mm2 kp/mm2", "n": "N", "mn": "mN", "kn": "kN", "gf": "gf", "kgf": "kgf kp", "lbf": "lbf lb lbs",
     "mm": "mm", "um": "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m", "cm": "cm", "m": "m", "in": 'in inch "',
+    "s": "s sec", "ms": "ms", "min": "min", "h": "h", "hz": "Hz hz", "khz": "kHz", "rad_s": "rad/s",
     "percent": "% percent", "1": "1 - \N{EN DASH} mm/mm m/m in/in"}
 _UNITS = {text: unit for unit, texts in _WRITTEN.items() for text in texts.split()} | {"": "1"}
 _IN_HEADER = re.compile(r"(?:[\[(]|\s/|,\s|\sin\s)\s*([^\[\]()]+?)\s*[\])]?$")
@@ -84,10 +88,17 @@ STRESSES = _NOMINAL | _FORCES | _with_units("true_stress", lambda value, x, spec
 SHEAR_STRESSES = (_with_units("shear_stress", lambda value, x, specimen: value) | _NOMINAL | _FORCES
                   | _with_units("true_stress", lambda value, x, specimen: value))
 PRESSURES = _with_units("pressure", lambda value, x, specimen: value)
+# Over time: the stress after a step of strain, in any measure that is proportional to the modulus; and the moduli in frequency.
+TIMES = _with_units("time", lambda value: value)
+_OVER_TIME = ("relaxation_modulus", "nominal_stress", "true_stress", "shear_stress", "force")
+RELAXING = {name: convert for base in _OVER_TIME for name, convert in _with_units(base, lambda value: value).items()} | {
+    "normalised_modulus": lambda value: value}
+FREQUENCIES = _with_units("frequency", lambda value: value)
+STORAGE, LOSS = (_with_units(base, lambda value: value) for base in ("storage_modulus", "loss_modulus"))
 _OF_MODE = {VOLUMETRIC: ((VOLUMES, "volume"), (PRESSURES, "pressure")),
             SIMPLE_SHEAR: ((SHEARS, "shear strain"), (SHEAR_STRESSES, "stress"))}
 _OF_SHAPE = ((STRETCHES, "stretch"), (STRESSES, "stress"))
-NAMES = (*STRETCHES, *STRESSES, *SHEARS, *SHEAR_STRESSES, *VOLUMES, *PRESSURES)
+NAMES = (*STRETCHES, *STRESSES, *SHEARS, *SHEAR_STRESSES, *VOLUMES, *PRESSURES, *TIMES, *RELAXING, *FREQUENCIES, *STORAGE, *LOSS)
 
 
 @dataclass(frozen=True)
@@ -112,16 +123,16 @@ def find_columns(table: Table, *, mode: str, columns: Mapping[str, str]) -> tupl
 
     columns: {name: that in the file}
     """
-    unknown = sorted(set(columns) - {*NAMES, *BASES})
-    if unknown:
-        raise InputError(f"{table.path}: `columns` maps {unknown[0]!r}, which is no quantity with a unit; map one of "
-                         f"{', '.join(_examples(NAMES))}.")
     return find_quantities(table, _OF_MODE.get(mode, _OF_SHAPE), columns)
 
 
 def find_quantities(table: Table, wanted: Sequence[tuple[Mapping[str, Callable[..., Any]], str]],
                     columns: Mapping[str, str]) -> tuple[list[Column], int]:
     """A column for each of the wanted ({accepted name: function}, quantity in words), and how many rows of units follow."""
+    unknown = sorted(set(columns) - {*NAMES, *BASES})
+    if unknown:
+        raise InputError(f"{table.path}: `columns` maps {unknown[0]!r}, which is no quantity with a unit; map one of "
+                         f"{', '.join(_examples(NAMES))}.")
     found = [_find(table, list(known), columns, quantity) for known, quantity in wanted]
     found = [_as_in_header(table, column) for column in found]
     units = _units_below(table, found)

@@ -16,6 +16,7 @@ from softtact.errors import InputError
 from softtact.materials.curves import AnyCurve
 from softtact.materials.laws.base import Law, principal_stretches, work_divisor
 from softtact.materials.laws.registry import LAWS, law_class
+from softtact.materials.uncertainty import corrected_aic, correlation_of, covariance_of, unseen
 
 STARTS = 24
 RESIDUALS = ("absolute", "relative")
@@ -23,8 +24,6 @@ RESIDUALS = ("absolute", "relative")
 _RELATIVE_FLOOR = 0.01
 # Most starts end in a few minima: some steps show which, and only the best starts are continued to convergence.
 _COARSE, _PROMISING, _FINAL = 10, 6, 100     # steps, starts, steps
-_SINGULAR = 1e-7        # of the largest singular value: the constants' columns depend on each other
-_PARTICIPATES = 0.1       # component of a unit vector of constants that does not change the curves
 _LOOSE_SHARE = 0.05     # of the initial shear modulus: a constant in MPa with a smaller error is identifiable, even if it is zero
 
 
@@ -252,19 +251,19 @@ def _report(problem, x, record):
     error, residual, jacobian = points.predict(law) - points.stress, problem.residual(x), problem.jacobian(x)
     relative = error / points.size
     n, p = len(error), len(x)
-    covariance = _covariance(jacobian, float(residual @ residual) / (n - p))
+    covariance = covariance_of(jacobian, float(residual @ residual) / (n - p))
     return LawFit(
         law=problem.kind.name,
         parameters=law.parameters,
         covariance=covariance,
-        correlation=None if covariance is None else _correlation(covariance),
+        correlation=None if covariance is None else correlation_of(covariance),
         not_identifiable=_not_identifiable(law, jacobian, covariance),
         rmse_mpa=rms(error),
         rmse_by_mode_mpa=points.by_mode(rms, error),
         relative_error=rms(relative),
         relative_error_by_mode=points.by_mode(rms, relative),
         autocorrelation=_autocorrelation(residual, points.mode),
-        aicc=_aicc(residual, p),
+        aicc=corrected_aic(residual, p),
         at_bound=_at_bound(problem, x),
         record=record,
     )
@@ -273,12 +272,6 @@ def _report(problem, x, record):
 def rms(values: np.ndarray) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-def _aicc(residual, constants):
-    """n ln(SS/n) + 2k n/(n - k - 1); k counts the constants and the variance (Burnham and Anderson 2002, section 7.7.6)."""
-    n, k = len(residual), constants + 1
-    return float(n * np.log(max(residual @ residual, 1e-30) / n) + 2 * k * n / max(n - k - 1, 0.5))
 
 
 def _at_bound(problem, x):
@@ -294,37 +287,13 @@ def _autocorrelation(residual, mode):
     return float((residual[1:] @ (residual[:-1] * same)) / max(residual @ residual, 1e-300))
 
 
-def _covariance(jacobian, variance):
-    """variance (J^T J)^-1, or None where columns of J depend on each other."""
-    size = np.linalg.norm(jacobian, axis=0)
-    if not (size > 0).all() or np.linalg.cond(jacobian / size) > 1 / _SINGULAR:
-        return None
-    scaled = np.linalg.inv((jacobian / size).T @ (jacobian / size))
-    return variance * scaled / np.outer(size, size)
-
-
-def _correlation(covariance):
-    deviation = np.sqrt(np.diag(covariance))
-    with np.errstate(divide="ignore", invalid="ignore"):   # a fit without any error has no deviations
-        correlation = covariance / np.outer(deviation, deviation)
-    return np.where(np.isfinite(correlation), correlation, np.eye(len(deviation)))
-
-
 def _not_identifiable(law, jacobian, covariance):
     """Constants whose standard error exceeds their value, or that can change together without a change of the curves."""
     values = np.array(list(law.parameters.values()))
     if covariance is None:
-        loose = _unseen(jacobian)
+        loose = unseen(jacobian)
     else:
         known = [max(abs(value), _LOOSE_SHARE * law.mu0 if constant.unit == "MPa" else 0.0)
                  for value, constant in zip(values, law.constants, strict=True)]
         loose = np.sqrt(np.diag(covariance)) > known
     return [name for name, bad in zip(law.parameters, loose, strict=True) if bad]
-
-
-def _unseen(jacobian):
-    """Whether each constant takes part in a joint change of constants that does not change the curves."""
-    size = np.linalg.norm(jacobian, axis=0)
-    _, singular, directions = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
-    unseen = directions[singular <= _SINGULAR * singular.max()]
-    return (size == 0) | (np.abs(unseen) > _PARTICIPATES).any(axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.materials.checks import DEFORMATION, normal_noise, refuse_first
-from softtact.materials.laws.base import rest_of
+from softtact.materials.laws.base import principal_stretches, rest_of
 
 HOLDS = INSTANTANEOUS, RELAXED = ("instantaneous", "relaxed")
 _JITTER = 0.05      # share of the range by which a branch may turn back (noise of the strain)
@@ -98,6 +98,16 @@ def _relaxation(stress: np.ndarray, *, least: float, noise: float) -> float:
     return float(fall) if fall < _FALLS[2] else 0.0
 
 
+def refuse_cycles(path: str | Path, rows: np.ndarray, x: np.ndarray, *, mode: str) -> None:
+    """Refuse rows that turn back over the range before: a law has one stress at a stretch."""
+    turn = _unloading(x)
+    if turn is not None:
+        raise InputError(
+            f"{path}, row {rows[turn]}: the {DEFORMATION.get(mode, 'stretch')} turns back at {x[turn]:.6g} over the range before, "
+            "so loading and unloading (or several cycles) follow each other; keep the rows of one branch, or state which to take "
+            "(--cycles first, steady or mullins).")
+
+
 def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str,
           sort: bool) -> tuple[np.ndarray, np.ndarray]:
     """x and y in rising or falling order: as they are, or sorted.
@@ -108,11 +118,7 @@ def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, m
     name = DEFORMATION.get(mode, "stretch")
     if x.min() == x.max():
         raise InputError(f"{path}: every row has the {name} {x[0]:.6g}; give a curve over a range.")
-    turn = _unloading(x)
-    if turn is not None:
-        raise InputError(f"{path}, row {rows[turn]}: the {name} turns back at {x[turn]:.6g} over the range before it, so loading "
-                         "and unloading (or several cycles) follow each other; keep the rows of one branch, or state which to "
-                         "take (--cycles first, steady or mullins).")
+    refuse_cycles(path, rows, x, mode=mode)
     if sort:
         by_x = np.argsort(x, kind="stable")
         return x[by_x], y[by_x]
@@ -154,3 +160,25 @@ def _turns(x):
             turns.append(extreme)
             extreme, direction = k, -direction
     return [*turns, len(x) - 1]
+
+
+def first_loading(x: np.ndarray, *, mode: str) -> np.ndarray:
+    """Booleans (n,): whether a row, in the order of time, is of first loading: I1 - 3 exceeds that of all rows before."""
+    excess = loading(x, mode=mode)
+    return np.concatenate([[True], excess[1:] > np.maximum.accumulate(excess)[:-1]])
+
+
+def loading(x: np.ndarray, *, mode: str) -> np.ndarray:
+    """I1 - 3 (n,) of the incompressible material: neo-Hooke's energy but for a factor, which orders the rows of a test of shape."""
+    return (principal_stretches(mode, x) ** 2).sum(axis=1) - 3
+
+
+def steady_loading(x: np.ndarray, *, mode: str) -> np.ndarray | None:
+    """Indices of the rows of the last loading branch; None where there is no unloading before it."""
+    excess = loading(x, mode=mode)
+    turns = _turns(excess)
+    branches = [(start, end) for start, end in zip(turns, turns[1:], strict=False) if excess[end] > excess[start]]
+    if len(branches) < 2:
+        return None
+    start, end = branches[-1]
+    return np.arange(start, end + 1)

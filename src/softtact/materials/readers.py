@@ -11,7 +11,7 @@ A curve is one loading branch, in the file's order or sorted; loading and unload
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,9 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.materials.checks import checked
 from softtact.materials.columns import Specimen, find_columns, refuse_lacking
-from softtact.materials.curves import MODES, AnyCurve, make_curve
-from softtact.materials.history import HOLDS, order, without_holds
+from softtact.materials.curves import MODES, VOLUMETRIC, AnyCurve, make_curve
+from softtact.materials.cycles import CyclicTest
+from softtact.materials.history import HOLDS, order, refuse_cycles, without_holds
 from softtact.tables import number, read_bare, read_table
 
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
@@ -91,6 +92,41 @@ def read_curves(paths: str | Path | Sequence[str | Path], *, mode: str | None = 
     return [curve for curve, _ in read]
 
 
+def read_cycles(paths: Sequence[str | Path], *, cycles: str, mode: str | None = None,
+                **options: Any) -> tuple[list[AnyCurve], list[CyclicTest]]:
+    """The curves of tests with loading and unloading that laws are fitted to, and the tests of shape, in the order of time.
+
+    cycles: `first` or `mullins`, the curves are those of first loading, or `steady`, those of the last loading
+    Other arguments are those of `read_curves`, and so are the checks.
+    """
+    found = [_read_history(path, Reading(mode=stated, **options), cycles) for path, stated in stated_files(paths, mode=mode)]
+    _refuse_unused(options.get("columns") or {}, [header for _, _, header in found])
+    tests = [test for _, test, _ in found if test is not None]
+    if all(test.first.all() for test in tests):
+        raise InputError(f"{', '.join(test.history.source for test in tests) or paths[0]}: the strain only grows, so --cycles has "
+                         "no effect; leave it out.")
+    return [curve for curve, _, _ in found], tests
+
+
+def _read_history(path, reading, cycles):
+    """The curve of a file for a law; the test itself, None for a volumetric one; and the header."""
+    table = _table(path, reading)
+    notes = _notes(table)
+    mode = _mode(path, reading.mode, notes)
+    if mode == VOLUMETRIC:
+        curve, header = _read(path, reading)
+        return curve, None, header
+    if reading.sort or reading.holds is not None:
+        raise InputError(f"{path}: the rows of cycles are in the order of time, and none is a hold; leave "
+                         f"{'--sort' if reading.sort else '--holds'} out, or --cycles.")
+    rows, values, raw = _values(table, reading, mode)
+    test = CyclicTest(make_curve(mode, *values, kind=notes.get("kind", "measured"), source=Path(path).name))
+    used = test.rows(cycles)
+    remarks = checked(path, rows[used], *values[:, used], mode=mode, raw=raw[:, used], compression=reading.compression,
+                      window=reading.window.get(mode))
+    return replace(test.curve(cycles), remarks=(*_of_table(table), *remarks)), test, table.header
+
+
 def stated_files(paths: str | Path | Sequence[str | Path], *, mode: str | None = None,
                  layout: str = "plain") -> list[tuple[Path, str | None]]:
     """[(file, its mode or None)] of the arguments of `read_curves`; a mode without effect is refused."""
@@ -108,6 +144,7 @@ def _read(path, reading):
     notes = _notes(table)
     mode = _mode(path, reading.mode or ("uniaxial" if reading.layout == "soro_db" else None), notes)
     rows, values, raw = _values(table, reading, mode)
+    refuse_cycles(path, rows, values[0], mode=mode)     # first, as the stress of a turn is that of a short hold
     used = without_holds(path, rows, *values, mode=mode, holds=reading.holds)
     _check_count(path, used)
     rows, values, raw = rows[used], values[:, used], raw[:, used]

@@ -1,14 +1,17 @@
-"""Plot a material card: test curves with the fitted laws, residuals, and stable ranges."""
+"""Plot a material card: test curves with the fitted laws, cycles, tests over time, residuals, and stable ranges."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.materials.cards import law_of_entry
+from softtact.materials.cards import law_of_entry, mullins_from_card, prony_from_card
 from softtact.materials.curves import VOLUMETRIC, AnyCurve, join_by_mode, path_of
+from softtact.materials.cycles import CyclicTest, energy_of
 from softtact.materials.laws.base import SIMPLE_SHEAR
+from softtact.materials.time_tests import RELAXATION, TimeTest
 from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:
@@ -20,24 +23,41 @@ _BEYOND = 0.15      # of the window's range, by which data and lines may extend 
 _MODE_COLOURS = {"uniaxial": "#1f4e79", "equibiaxial": "#e08214", "planar": "#3f9c6d"}
 
 
-def plot_material(card: dict[str, Any], curves: Sequence[AnyCurve], *paths: str | Path) -> None:
-    """Draw a card (dict) and the curves it was fitted to (list) as PNG or SVG files."""
-    save(draw_material(card, curves), *paths)
+def plot_material(card: dict[str, Any], curves: Sequence[AnyCurve], *paths: str | Path, cycles: Sequence[CyclicTest] = (),
+                  over_time: Sequence[TimeTest] = ()) -> None:
+    """Draw a card (dict) and the tests it was fitted to as PNG or SVG files."""
+    save(draw_material(card, curves, cycles=cycles, over_time=over_time), *paths)
 
 
-def draw_material(card: dict[str, Any], curves: Sequence[AnyCurve]) -> "Figure":
-    """The figure: a column per test mode with data and fits above residuals, and the stable ranges below."""
+def draw_material(card: dict[str, Any], curves: Sequence[AnyCurve], *, cycles: Sequence[CyclicTest] = (),
+                  over_time: Sequence[TimeTest] = ()) -> "Figure":
+    """The figure: a column per test with data and fits above residuals, and the stable ranges of laws below.
+
+    cycles: tests with unloading, drawn with the card's Mullins effect;  over_time: drawn with its Prony series
+    """
     plt = pyplot()
     curves = join_by_mode(curves)
-    figure = plt.figure(figsize=(3.6 * max(len(curves), 2), 8.2), layout="constrained")
-    rows = figure.add_gridspec(3, len(curves), height_ratios=(2.2, 1.0, 0.4 + 0.2 * len(card["ranking"])))
-    names = _shown(card)
-    for k, curve in enumerate(curves):
+    cycles = cycles if "mullins" in card else ()
+    columns = len(curves) + len(cycles) + len(over_time)
+    figure = plt.figure(figsize=(3.6 * max(columns, 2), 8.2 if curves else 5.6), layout="constrained")
+    heights = (2.2, 1.0, 0.4 + 0.2 * len(card["ranking"])) if curves else (2.2, 1.0)
+    rows = figure.add_gridspec(len(heights), columns, height_ratios=heights)
+    pairs = []
+    for k in range(columns):
         above = figure.add_subplot(rows[0, k])
-        below = figure.add_subplot(rows[1, k], sharex=above)
+        pairs.append((above, figure.add_subplot(rows[1, k], sharex=above)))
+    names = _shown(card) if curves else []
+    for (above, below), curve in zip(pairs, curves, strict=False):
         draw = _draw_volume if curve.mode == VOLUMETRIC else _draw_shape
         draw(above, below, card, curve, names)
         above.set_title(f"{curve.mode}, {len(curve.stress)} points, {curve.kind}")
+    for (above, below), test in zip(pairs[len(curves):], cycles, strict=False):
+        _draw_cycles(above, below, card, test)
+    for (above, below), timed, scale in zip(pairs[len(curves) + len(cycles):], over_time, _scales(card), strict=False):
+        _draw_over_time(above, below, card, timed, scale)
+    if not curves:
+        figure.suptitle(f"{card['material']}: Prony series of {len(card['prony']['g'])} terms")
+        return figure
     handles, labels = figure.axes[0].get_legend_handles_labels()
     ranges = figure.add_subplot(rows[2, :])
     _draw_ranges(ranges, card)
@@ -45,6 +65,58 @@ def draw_material(card: dict[str, Any], curves: Sequence[AnyCurve]) -> "Figure":
                   loc="outside lower center", ncols=3, fontsize=8)
     figure.suptitle(f"{card['material']}: chosen {card['chosen']}; errors are root mean squares over all points")
     return figure
+
+
+def _scales(card):
+    """The instantaneous moduli of the tests over time, in the measure of each."""
+    return [test["instantaneous_modulus"] for test in card["prony"]["tests"]] if "prony" in card else []
+
+
+def _draw_cycles(above, below, card, test):
+    """Loading and unloading with the chosen law and its softening, in the order of time."""
+    law, effect = law_of_entry(card["chosen"], card["laws"][card["chosen"]]), mullins_from_card(card)
+    curve = test.history
+    energy = energy_of(law, curve.mode, curve.deformation)
+    model = effect.softening(energy, np.maximum.accumulate(energy)) * law.nominal_stress(curve.mode, curve.deformation)
+    above.plot(curve.deformation, curve.stress, "o", ms=2.5, mfc="none", mew=0.5, color="0.45", label="data")
+    above.plot(curve.deformation, model, "k-", lw=1.0, label=f"{card['chosen']}, Mullins effect")
+    later = ~test.first
+    below.plot(curve.deformation[later], 1e3 * (model - curve.stress)[later], "k.", ms=2.5)
+    below.axhline(0, color="0.7", lw=0.6)
+    above.set(ylabel=_stress_label(curve.mode), title=f"{curve.mode}, cycles, {later.sum()} points unloaded or reloaded")
+    above.title.set_fontsize(9)
+    above.legend(frameon=False, fontsize=8)
+    below.set(xlabel=_strain_label(curve.mode), ylabel="effect - data (kPa)")
+
+
+def _draw_over_time(above, below, card, test, scale):
+    """Relaxation over time, or storage and loss modulus over frequency, with the Prony series; the relaxation times as ticks."""
+    series = prony_from_card(card)
+    dense = replace(test, at=np.geomspace(test.at[test.at > 0].min(), test.at.max(), 300))
+    names = ("modulus",) if test.mode == RELAXATION else ("storage modulus", "loss modulus")
+    drawn = zip(test.values, dense.of(series), test.of(series), names, _LINES, strict=False)
+    for values, fine, fitted, name, (colour, style) in drawn:
+        above.plot(test.at, values / scale, "o", ms=3, mfc="none", mew=0.6, color=colour, label=f"{name}, data")
+        above.plot(dense.at, fine, color=colour, ls=style, lw=1.2, label=f"{name}, series")
+        below.plot(test.at, 100 * (scale * fitted / values - 1), color=colour, ls=style, lw=1)
+    places = np.array(series.tau_s) if test.mode == RELAXATION else 1 / (2 * np.pi * np.array(series.tau_s))
+    above.plot(places, np.full(len(places), 0.02), "|", ms=10, color="black", transform=above.get_xaxis_transform(), clip_on=False,
+               label="relaxation times" if test.mode == RELAXATION else "1/(2 pi tau)")
+    below.axhline(0, color="0.7", lw=0.6)
+    above.set(xscale="log", yscale="linear" if test.mode == RELAXATION else "log", ylabel="modulus / instantaneous modulus",
+              title=f"{test.mode}, {len(test.at)} points")
+    if test.mode != RELAXATION:
+        above.set_ylim(top=10 * above.get_ylim()[1])     # room for the legend
+    above.legend(frameon=False, fontsize=8, loc="upper right" if test.mode == RELAXATION else "upper left")
+    below.set(xlabel="time (s)" if test.mode == RELAXATION else "frequency (Hz)", ylabel="series - data (%)")
+
+
+def _stress_label(mode):
+    return "shear stress (MPa)" if mode == SIMPLE_SHEAR else "nominal stress (MPa)"
+
+
+def _strain_label(mode):
+    return "shear strain" if mode == SIMPLE_SHEAR else "stretch"
 
 
 def _shown(card):
@@ -71,8 +143,8 @@ def _draw_shape(above, below, card, curve, names):
     top, bottom = near.stress.max(), min(near.stress.min(), 0)
     above.set(xlim=(stretch[0], stretch[-1]), ylim=(bottom - 0.05 * (top - bottom), top + 0.1 * (top - bottom)))
     below.axhline(0, color="0.7", lw=0.6)
-    above.set_ylabel("shear stress (MPa)" if curve.mode == SIMPLE_SHEAR else "nominal stress (MPa)")
-    below.set(xlabel="shear strain" if curve.mode == SIMPLE_SHEAR else "stretch", ylabel="law - data (kPa)")
+    above.set_ylabel(_stress_label(curve.mode))
+    below.set(xlabel=_strain_label(curve.mode), ylabel="law - data (kPa)")
 
 
 def _draw_volume(above, below, card, curve, names):
