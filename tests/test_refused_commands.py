@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softtact.cli import main
+from softtact.cli import _parser, main
 from softtact.errors import InputError
 from softtact.files import parse_json, read_yaml
 from softtact.outputs import refuse_overwriting
@@ -137,6 +137,29 @@ def test_pictures_of_discs_do_not_take_the_place_of_frames(folder, capsys):
                            ("detect-discs frames --pixel-mm 1 --out d.csv --picture frames", "it is the folder of the frames")]:
         status, out, said = said_by(capsys, line)
         assert (status, out) == (1, "") and sentence in said, line
+
+
+@pytest.mark.parametrize(("line", "sentence"), [
+    (f"{FIT} --law yeoh", "argument --law: it is given twice, neo_hooke and yeoh; write its values with commas"),
+    (f"{PRESS} --unit cm", "argument --unit: it is given twice, mm and cm; give it once"),
+    (f"{PRESS} --model elastic --mod=foundation", "argument --model: it is given twice, elastic and foundation; give it once"),
+    (f"{PRESS} --repair --no-repair", "argument --repair/--no-repair: it is given twice; give it once")])
+def test_an_option_of_one_value_that_is_given_twice_is_refused(folder, capsys, line, sentence):
+    with pytest.raises(SystemExit) as stopped:
+        main(line.split())
+    assert stopped.value.code == 2 and sentence in capsys.readouterr().err
+
+
+def test_options_of_several_values_may_be_repeated():
+    options = _parser().parse_args(f"{PRESS} --force 10 --json --json".split())
+    assert options.force == [5.0, 10.0]
+
+
+@pytest.mark.parametrize("line", [f"{FIT} uniaxial=plain.csv", f"{FIT} planar=./plain.csv",
+                                  "calibrate plain.csv plain.csv --press part.stl --unit mm --force 5 --out mine.yaml"])
+def test_a_file_that_is_given_twice_is_refused(folder, capsys, line):
+    status, _, err = said_by(capsys, line)
+    assert status == 1 and "plain.csv: the file is given twice, and would weigh twice; give it once" in err
 
 
 def test_outputs_that_are_no_inputs_pass(tmp_path):

@@ -62,10 +62,21 @@ class _Parser(argparse.ArgumentParser):
     """An argument parser whose error message is one sentence."""
 
     _words: Sequence[str] = ()
+    _seen: dict[argparse.Action, str] = {}
 
     def parse_known_args(self, args=None, namespace=None):
-        self._words = sys.argv[1:] if args is None else list(args)
+        self._words, self._seen = sys.argv[1:] if args is None else list(args), {}
         return super().parse_known_args(args, namespace)
+
+    def _get_values(self, action, arg_strings):
+        """The values of an option or argument, once; argparse would let the last one of an option win without a word."""
+        if isinstance(action, argparse._StoreAction | argparse.BooleanOptionalAction) and action.option_strings:
+            if action in self._seen:
+                remedy = "write its values with commas" if "with commas" in (action.help or "") else "give it once"
+                both = f", {self._seen[action]} and {' '.join(arg_strings)}" if arg_strings else ""
+                raise argparse.ArgumentError(action, f"it is given twice{both}; {remedy}")
+            self._seen[action] = " ".join(arg_strings)
+        return super()._get_values(action, arg_strings)
 
     def error(self, message):
         self.exit(2, f"{self.prog}: {self._with_minus(message) or message}; see {self.prog} --help.\n")

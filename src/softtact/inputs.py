@@ -9,7 +9,7 @@ import errno
 import math
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
@@ -94,6 +94,17 @@ def refuse_pointer(path: str | Path, beginning: bytes) -> None:
 def is_hidden(path: PurePath) -> bool:
     """Whether a file is one that systems hide and put beside others, such as ._part.stl and .DS_Store of macOS."""
     return path.name.startswith(".")
+
+
+def refuse_twice(paths: Iterable[str | Path]) -> None:
+    """Refuse a file that is given twice, under whatever name: it would weigh twice."""
+    seen: dict[str, str | Path] = {}
+    for path in paths:
+        place = os.path.realpath(path)
+        if place in seen:
+            also = "" if str(seen[place]) == str(path) else f", also as {seen[place]}"
+            raise InputError(f"{path}: the file is given twice{also}, and would weigh twice; give it once.")
+        seen[place] = path
 
 
 def no_name(error: OSError | ValueError) -> str:

@@ -193,8 +193,8 @@ def test_a_volumetric_curve_reads_back(tmp_path):
 
 
 def test_a_path_can_state_its_own_mode(write_file):
-    path = write_file(PLAIN, "specimen_7.csv")
-    assert [curve.mode for curve in read_curves([f"planar={path}", f"uniaxial={path}"])] == ["planar", "uniaxial"]
+    paths = write_file(PLAIN, "specimen_7.csv"), write_file(PLAIN, "specimen_8.csv")
+    assert [curve.mode for curve in read_curves([f"planar={paths[0]}", f"uniaxial={paths[1]}"])] == ["planar", "uniaxial"]
 
 
 def test_a_compression_test_without_a_minus_is_read_when_told(write_file):

@@ -7,7 +7,7 @@ import yaml
 from support.probes import small_design
 
 from softtact.errors import InputError
-from softtact.probe.design import load_design
+from softtact.probe.design import check_design, load_design
 
 TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
 
@@ -23,6 +23,10 @@ TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
     ({"tissues": {"rubber": TISSUE}}, "yeoh needs its parameters"),
     ({"tissue": {}}, "did you mean 'tissues'"),
     ({"mesh": {"beam_layers": 3}}, "multiple of 2"),
+    ({"mesh": {"tissue": 1e-4}}, "the mesh would have .* elements, more than 200,000; make its sides longer"),
+    ({"geometry": {"support_length": 0.015}}, "geometry.support_length is 0.015"),
+    ({"load_n": {"to": 5000.0}}, "load_n.to is 5000.0"),
+    ({"displacement_mm": {"by": 1e-6}}, "more than 1000; make them larger"),
 ])
 def test_a_value_that_does_not_fit_is_named(changes, said):
     with pytest.raises(InputError, match=said):
@@ -35,6 +39,20 @@ def test_a_files_fault_names_the_file_and_the_variant(tmp_path):
     path.write_text(yaml.safe_dump(values | {"mesh": {}}))
     with pytest.raises(InputError, match=r"design\.yaml: variants\.odd: .*jaw is 'loose'"):
         load_design(path)
+
+
+@pytest.mark.parametrize(("part", "young_mpa", "sentence"), [
+    ("rubber", 28600.0, r"tissues.rubber: Young's modulus is 2.86e\+04 MPa, stiffer than the .* MPa\); is it in Pa or kPa\? Then "
+                        r"write 0.0286 or 28.6"),
+    ("rubber", 286.0, "stiffer than any soft tissue or rubber .20 MPa.; is it in Pa or kPa. Then write 0.000286 or 0.286"),
+    ("filler", 2743.0, "filler: Young's modulus is 2743 MPa, stiffer than any soft tissue or rubber"),
+    ("beam", 3.5e9, r"beam: Young's modulus is 3.5e\+09 MPa, stiffer than diamond")])
+def test_a_modulus_in_pascal_is_asked_for(part, young_mpa, sentence, tmp_path):
+    material = {"young_mpa": young_mpa, "poisson": 0.45, "source": "a test's"}
+    changed = {"tissues": {part: material}} if part == "rubber" else {part: material}
+    values = small_design().model_dump(exclude_none=True) | changed
+    with pytest.raises(InputError, match=rf"design.yaml: .*{sentence}"):
+        check_design(values, "design.yaml")
 
 
 def test_an_unknown_tissue_is_refused_with_those_there_are():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from softtact.commands.common import add_command, add_unit, check_names, report_reading, sensor_path, sensor_spec, show
 from softtact.errors import InputError
+from softtact.inputs import refuse_twice
 from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
@@ -87,6 +88,7 @@ def _checked(options):
 
     check_outputs(options.out, options.report)
     check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})
+    refuse_twice(options.recordings)
     count = len(options.recordings)
     meshes, forces, places = (_for_each(name, getattr(options, name), count) for name in ("press", "force", "place"))
     logs = [force for force in forces if not _is_number(force)]

@@ -176,6 +176,8 @@ def _fault(model, field, fault):
     if fault["type"] == "missing":
         return f"the key {field} is missing; add it."
     reason = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] == "value_error" and isinstance(fault["input"], dict):     # a section whose keys do not fit together
+        return f"{field}: {reason}."
     return f"{field} is {fault['input']!r:.80}; {reason[0].lower()}{reason[1:]}."
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.inputs import refuse_twice
 from softtact.materials.checks import checked
 from softtact.materials.columns import Specimen, find_columns, refuse_lacking
 from softtact.materials.curves import MODES, VOLUMETRIC, AnyCurve, make_curve
@@ -135,6 +136,7 @@ def stated_files(paths: str | Path | Sequence[str | Path], *, mode: str | None =
     each_stated = layout == "literature" or not any(path == Path(given) for given, (path, _) in zip(paths, found, strict=False))
     if mode is not None and each_stated:
         raise InputError(f"the mode {mode} for all files has no effect, as each states one; leave it out.")
+    refuse_twice([path for path, _ in found])
     return found
 
 

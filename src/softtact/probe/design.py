@@ -19,6 +19,9 @@ from softtact.materials.linear import LinearConstants
 from softtact.sensors.fields import FiniteSection
 
 Positive = Annotated[float, Field(gt=0)]
+Length = Annotated[float, Field(ge=0.05, le=1000)]
+_SOFT_MPA, _STIFF_MPA = 20.0, 1e6     # largest Young's modulus of a tissue or filler, and of supports and beam: diamond's
+_MOST_STEPS, _MOST_ELEMENTS = 1000, 200_000
 REGIONS = ("left support", "right support", "filler", "beam", "tissue")
 
 
@@ -59,12 +62,12 @@ class Material(FiniteSection):
 class Geometry(FiniteSection):
     """Sizes in mm."""
 
-    support_length: Positive
-    support_height: Positive
-    filler_length: Positive
-    beam_height: Positive
-    tissue_height: Positive
-    depth: Positive = Field(description="out of the plane")
+    support_length: Length
+    support_height: Length
+    filler_length: Length
+    beam_height: Length
+    tissue_height: Length
+    depth: Length = Field(description="out of the plane")
 
     @property
     def length(self) -> float:
@@ -97,8 +100,15 @@ class Film(FiniteSection):
 class Steps(FiniteSection):
     """Equal steps up to a final value."""
 
-    to: Positive
+    to: Annotated[float, Field(gt=0, le=1000)]
     by: Positive
+
+    @pydantic.model_validator(mode="after")
+    def _not_too_many(self):
+        if self.to / self.by > _MOST_STEPS:
+            raise ValueError(f"steps of {self.by:g} up to {self.to:g} are {self.to / self.by:.0f}, more than {_MOST_STEPS}; make "
+                             "them larger")
+        return self
 
     @property
     def values(self) -> np.ndarray:
@@ -113,7 +123,7 @@ class Lump(FiniteSection):
     depth: Positive = Field(description="of its middle below the jaw's face of the tissue")
     width: Positive
     height: Positive
-    stiffness_ratio: Positive = Field(description="its moduli over those of the tissue")
+    stiffness_ratio: Annotated[float, Field(gt=0, le=1e4)] = Field(description="its moduli over those of the tissue")
 
 
 class Hardness(FiniteSection):
@@ -121,7 +131,7 @@ class Hardness(FiniteSection):
 
     tissue_heights: list[Positive] = Field(min_length=1)
     shares: list[Annotated[float, Field(gt=0, le=1)]] = Field(min_length=2, description="of the jaw's displacement in a sweep")
-    steps: int = Field(8, ge=4)
+    steps: int = Field(8, ge=4, le=_MOST_STEPS)
 
     @pydantic.model_validator(mode="after")
     def _enough(self):
@@ -143,7 +153,7 @@ class LumpSearch(FiniteSection):
     noise_n: Positive = Field(description="standard deviation of a film's reading")
     moves: list[float] = Field([0.0], min_length=1, description="displacement in mm of the sensor back along the tissue for each "
                                "press, from the first place on: a lump's x is larger by it")
-    trials: int = Field(20, ge=1)
+    trials: int = Field(20, ge=1, le=100_000)
     seed: int = Field(0, ge=0)
     assumed: bool = False
     source: str = Field(min_length=1)
@@ -188,7 +198,7 @@ class PalpationDesign(FiniteSection):
     mesh: MeshSizes = MeshSizes()
     lump: Lump | None = None
     variants: dict[str, dict[str, Any]] = Field(default_factory=dict, description="designs with other values of some keys, by name")
-    variant_steps: int = Field(6, ge=3, description="steps of the jaw's displacement in a variant")
+    variant_steps: int = Field(6, ge=3, le=_MOST_STEPS, description="steps of the jaw's displacement in a variant")
     hardness: Hardness | None = None
     search: LumpSearch | None = None
 
@@ -204,11 +214,19 @@ class PalpationDesign(FiniteSection):
         if self.displacement_mm.to >= self.geometry.tissue_height:
             raise ValueError(f"the jaw's displacement of {self.displacement_mm.to:g} mm is more than the tissue's height; make it "
                              "smaller")
+        if (count := self._elements()) > _MOST_ELEMENTS:
+            raise ValueError(f"the mesh would have {count:.2g} elements, more than {_MOST_ELEMENTS:,}; make its sides longer")
         if self.lump:
             self._lump_fits(self.lump)
         if self.search and self.search.tissue not in self.tissues:
             raise ValueError(f"search.tissue is {self.search.tissue!r}, which is none of {', '.join(self.tissues)}")
         return self
+
+    def _elements(self):
+        """About how many elements the mesh has."""
+        g, mesh = self.geometry, self.mesh
+        layers = g.support_height / mesh.base + mesh.beam_layers + g.tissue_height / mesh.tissue
+        return g.length / mesh.along * layers * (mesh.depth_layers if self.model == "solid" else 1)
 
     def _lump_fits(self, lump):
         half, height = 0.5 * lump.width, 0.5 * lump.height
@@ -256,17 +274,34 @@ def _changed(values, changes):
 def check_design(values: object, path: str | Path) -> PalpationDesign:
     """The design of keys and values that were read from a file. Raises InputError, one sentence with file, field and remedy."""
     design = validated(PalpationDesign, values, where=str(path))
-    for name, material in ({"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues).items():
-        try:
-            material.make()
-        except InputError as error:     # the constants' checks do not know the file
-            raise InputError(f"{path}: {name}: {error}") from None
+    _refuse_materials(design, str(path))
     for name in design.variants:
         try:
-            design.variant(name)
+            variant = design.variant(name)
         except InputError as error:
             raise InputError(f"{path}: variants.{name}: {error}") from None
+        _refuse_materials(variant, f"{path}: variants.{name}")
     return design
+
+
+def _refuse_materials(design, where):
+    """Refuse constants that a law does not allow, and moduli that are most likely in Pa."""
+    tissues = {f"tissues.{name}": material for name, material in design.tissues.items()}
+    young = {}
+    for name, material in ({"supports": design.supports, "beam": design.beam, "filler": design.filler} | tissues).items():
+        try:
+            law = material.make()
+        except InputError as error:     # the constants' checks do not know the file
+            raise InputError(f"{where}: {name}: {error}") from None
+        young[name] = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)
+    least = min(("supports", "beam"), key=young.__getitem__)
+    for name, value in young.items():
+        stiff = name in ("supports", "beam")
+        if value > _STIFF_MPA if stiff else value > min(_SOFT_MPA, young[least]):
+            limit = ("diamond" if stiff else f"the {least} ({young[least]:.4g} MPa)" if value > young[least] else
+                     f"any soft tissue or rubber ({_SOFT_MPA:g} MPa)")
+            raise InputError(f"{where}: {name}: Young's modulus is {value:.4g} MPa, stiffer than {limit}; is it in Pa or kPa? Then "
+                             f"write {1e-6 * value:.4g} or {1e-3 * value:.4g}.")
 
 
 def load_design(path: str | Path) -> PalpationDesign:

@@ -138,9 +138,10 @@ def draw_hardness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
         for (tissue, height), rows in table.groupby(["tissue", "tissue_height_mm"], sort=False):
             ax.plot(rows.force_n, rows[column], styles[heights.index(height) % len(styles)], marker="o", ms=3,
                     color=_COLOURS[tissues.index(tissue) % len(_COLOURS)], label=f"{_words(tissue)}, {height:g} mm")
-        ax.set(xlabel="largest force of the sweep, N", ylabel=title, xscale="log", yscale="log",
+        scales = {"yscale": "log"} if (table[column] > 0).any() else {}     # matplotlib warns of a log scale without a point
+        ax.set(xlabel="largest force of the sweep, N", ylabel=title, xscale="log", **scales,
                title=f"changes with load by up to {verdict(table, column).change_with_load:.0%}")
-        for axis in (ax.xaxis, ax.yaxis):     # plain numbers
+        for axis in (ax.xaxis, ax.yaxis)[:1 + len(scales)]:     # plain numbers
             axis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter(NullFormatter())
