@@ -156,6 +156,15 @@ def test_every_sign_of_a_minus_is_read_in_the_first_row_and_in_exponents(written
     assert curve.stretch.tolist() == [0.75, 0.5] and curve.nominal_stress.tolist() == [-0.15, -0.4]
 
 
+def test_a_blank_after_the_minus_is_read(written):
+    assert read_curve(written("stretch,nominal_stress_mpa\n0.5,- 0.2\n1,0\n")).nominal_stress.tolist() == [-0.2, 0.0]
+
+
+def test_a_mapped_name_may_hold_the_line_break_of_the_file(written):
+    columns = {"stretch": "Stretch\n[-]", "nominal_stress_mpa": "Stress\n[MPa]"}
+    assert read_curve(written('"Stretch\n[-]";"Stress\n[MPa]"\n1;0\n1.5;0.25\n'), columns=columns).stretch.tolist() == [1.0, 1.5]
+
+
 def test_a_dash_between_numbers_is_no_minus(written):
     with pytest.raises(InputError, match="row 2: '1–2' is not a number"):
         read_curve(written(HEADER + "1–2,0\n1.5,0.25\n"))

@@ -52,6 +52,7 @@ class Table:
 
     def positions(self, name: str) -> list[int]:
         """Positions of the columns of this name, also with the suffixes that programs add to a duplicate name."""
+        name = on_one_line(name)
         repeated = re.compile(re.escape(name) + r"([._]\d+| \(\d+\))")
         return [at for at, text in enumerate(self.header) if text == name or (name in self.header and repeated.fullmatch(text))]
 
@@ -96,7 +97,7 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
     first = _header_at(path, [line for _, line in lines], marker, layout)
     separator = separator or _separator([line for _, line in lines[first:]])
     (_, header), *rows = _records(path, lines[first:], separator)
-    table = Table(path, [_on_one_line(name) for name in header], rows, notes, decimal)
+    table = Table(path, [on_one_line(name) for name in header], rows, notes, decimal)
     return _whole(table, text, _NAMES.get(separator, repr(separator)))
 
 
@@ -158,8 +159,8 @@ def encoding_of(path: str | Path) -> str:
 
 
 def ascii_minus(text: str) -> str:
-    """The text without blanks at its ends, with `-` for the other signs of a minus: of a number, not within a sentence."""
-    return text.strip().translate(_MINUS)
+    """The text of a number without blanks at its ends and after its sign, with `-` for the other signs of a minus."""
+    return re.sub(r"^-\s+(?=[\d.,])", "-", text.strip().translate(_MINUS))
 
 
 def number(path: Path, row: int, cell: Cell, *, decimal: str | None = None) -> float:
@@ -323,9 +324,9 @@ def _of_sheet(path, records, *, what, marker, layout, decimal):
         raise InputError(f"{path}: the sheet is empty; give a {what} with its columns.")
     first = _header_at(path, ["\t".join(map(str, cells)) for _, cells in records], marker, layout)
     (_, header), *rows = records[first:]
-    return Table(path, [_on_one_line(str(name)) for name in header], rows, notes, decimal)
+    return Table(path, [on_one_line(str(name)) for name in header], rows, notes, decimal)
 
 
-def _on_one_line(name):
-    """The name of a column, with a blank for a line break within it."""
+def on_one_line(name: str) -> str:
+    """The name of a column, as a header has it: with a blank for a line break within it."""
     return re.sub(r"\s*[\r\n]\s*", " ", name.strip())

@@ -92,6 +92,15 @@ def test_cycles_that_the_effect_does_not_describe_are_told():
     assert any("it misses the stress of unloading and reloading by" in text for text in warnings)
 
 
+def test_only_rows_inside_the_window_fit_the_effect_but_those_beyond_it_soften():
+    test = softening_test(cycles_to(1.5, 2.0, 2.5))
+    found = fit_mullins(LAW, [test], window={"uniaxial": (1.0, 1.8)})
+    assert (found.effect.r, found.effect.m_mpa, found.effect.beta) == pytest.approx((1.8, 0.05, 0.2), rel=1e-4)
+    assert found.points < fit_mullins(LAW, [test]).points
+    with pytest.raises(InputError, match=r"0 row\(s\) of unloading with a stress are too few"):
+        fit_mullins(LAW, [test], window={"uniaxial": (3.0, 4.0)})
+
+
 def test_first_loading_is_the_envelope_and_the_steady_curve_the_last_loading(write_file):
     test = softening_test(cycles_to(1.5, 2.0, 2.0))
     (first,), tests = read_cycles([written(write_file, test)], cycles="first")

@@ -175,7 +175,7 @@ def _mullins_fit(options, card, tests):
 
     if options.cycles != "mullins":
         return None
-    return fit_mullins(law_of_entry(card["chosen"], card["laws"][card["chosen"]]), tests)
+    return fit_mullins(law_of_entry(card["chosen"], card["laws"][card["chosen"]]), tests, window=_windows(options))
 
 
 def _material(options):

@@ -244,7 +244,7 @@ def _shear_as_tension(stretch, stress, as_percent):
     gamma = stretch - 1
     line, percent = (_misfit(unit, stress) for unit in (gamma, _neo_hooke("planar", 1 + gamma / 100)))
     largest, tension = np.abs(gamma).max(), _misfit(_neo_hooke("planar", stretch), stress)
-    possible = 0.5 < largest <= LARGEST_SHEAR and _as_stiff_as_rubber(SIMPLE_SHEAR, gamma, stress)
+    possible = _START <= largest <= LARGEST_SHEAR and _as_stiff_as_rubber(SIMPLE_SHEAR, gamma, stress)
     if not possible or line >= _MUCH_BETTER * tension or as_percent and percent < _MUCH_BETTER * line:
         return None
     either = as_percent and line > _MUCH_BETTER * percent

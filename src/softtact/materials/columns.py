@@ -30,10 +30,11 @@ BASES = dict.fromkeys(("nominal_stress", "true_stress", "shear_stress", "pressur
 _PERCENT = {name: f"{name}_percent" for name in ("engineering_strain", "volumetric_strain", "shear_strain")}
 # A unit as it is written -> its name above. Case matters: mPa is not MPa.
 _WRITTEN = {
-    "mpa": "MPa MPA mpa N/mm2 MN/m2", "kpa": "kPa KPa kpa kN/m2", "pa": "Pa pa N/m2", "gpa": "GPa GPA kN/mm2", "bar": "bar Bar BAR",
-    "psi": "psi PSI lbf/in2 lb/in2 lbs/in2", "ksi": "ksi KSI", "n_cm2": "N/cm2", "kgf_cm2": "kgf/cm2 kg/cm2 kp/cm2",
-    "kgf_mm2": "kgf/mm2 kg/mm2 kp/mm2", "n": "N", "mn": "mN", "kn": "kN", "gf": "gf", "kgf": "kgf kp", "lbf": "lbf lb lbs",
-    "mm": "mm", "um": "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m", "cm": "cm", "m": "m", "in": 'in inch "',
+    "mpa": "MPa MPA Mpa mpa N/mm2 MN/m2", "kpa": "kPa KPa kpa kN/m2", "pa": "Pa pa N/m2", "gpa": "GPa GPA kN/mm2", "bar": "bar Bar",
+    "psi": "psi PSI Psi lbf/in2 lb/in2 lbs/in2", "ksi": "ksi KSI", "n_cm2": "N/cm2",
+    "kgf_cm2": "kgf/cm2 Kgf/cm2 KGF/CM2 kg/cm2 kp/cm2",
+    "kgf_mm2": "kgf/mm2 kg/mm2 kp/mm2", "n": "N", "mn": "mN", "kn": "kN", "gf": "gf g", "kgf": "kgf kp kg", "lbf": "lbf lb lbs",
+    "mm": "mm", "um": "um \N{MICRO SIGN}m \N{GREEK SMALL LETTER MU}m", "cm": "cm", "m": "m", "in": 'in inch inches "',
     "s": "s sec", "ms": "ms", "min": "min", "h": "h", "hz": "Hz hz", "khz": "kHz", "rad_s": "rad/s",
     "percent": "% percent", "1": "1 - \N{EN DASH} mm/mm m/m in/in"}
 _UNITS = {text: unit for unit, texts in _WRITTEN.items() for text in texts.split()} | {"": "1"}
@@ -168,7 +169,7 @@ def _find(table, known, columns, quantity):
     if len(found) == 1:
         return found[0]
     unmet = next((f"; none is called {columns[name]!r}, to which {name} is mapped" for name in accepted if name in columns
-                  and columns[name] not in table.header), "")
+                  and not table.positions(columns[name])), "")
     if len(table.header) == 1:
         raise InputError(f"{table.path}: the header names one column, {table.header[0]!r}; put commas, semicolons or tabs between "
                          "the columns, or pass over the lines above the header (--skip-rows N).")

@@ -11,7 +11,7 @@ References    Ogden and Roxburgh, Proc. R. Soc. A 455 (1999) 2861-2877; Abaqus A
 """
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,7 @@ _ONE_AMPLITUDE = 1.2    # ratio of the greatest energies below which m and beta 
 _LARGEST_ERROR = 0.25   # of the softened stress, root mean square: above, the effect does not describe these cycles
 _LARGEST_R = 100.0      # the softening is below 1 % there
 _LOOSE = 0.01           # a constant with a smaller standard error, in MPa or 1, is determined, even if it is zero
+_FEWEST = 4             # rows of unloading and reloading
 _STARTS = ((1.3, 3.0), (0.1, 0.5, 2.0), (0.02, 0.2))    # r; m over the mean W_max; beta
 
 
@@ -109,11 +110,12 @@ class Softened:
     measured: np.ndarray
 
 
-def softened_rows(law: Law, test: CyclicTest) -> Softened:
-    """The rows of a test that follow the Mullins effect of a law. Its window is no matter: the data are its own."""
+def softened_rows(law: Law, test: CyclicTest, window: Sequence[float] | None = None) -> Softened:
+    """The rows of a test, inside a window [min, max] of its strain, that follow the Mullins effect of a law."""
     curve = test.history
     energy = energy_of(law, curve.mode, curve.deformation)
-    later = ~test.first
+    low, high = window or curve.window
+    later = ~test.first & (curve.deformation >= low) & (curve.deformation <= high)
     return Softened(energy[later], np.maximum.accumulate(energy)[later], law.nominal_stress(curve.mode, curve.deformation[later]),
                     curve.stress[later])
 
@@ -124,10 +126,13 @@ def energy_of(law: Law, mode: str, deformation: np.ndarray) -> np.ndarray:
     return law.isochoric(np.concatenate([squares, np.zeros_like(squares)], axis=1), tangent=False).energy
 
 
-def fit_mullins(law: Law, tests: Sequence[CyclicTest]) -> MullinsFit:
-    """r, m and beta of cycles, for the law that was fitted to their first loading."""
-    rows = [softened_rows(law, test) for test in tests]
+def fit_mullins(law: Law, tests: Sequence[CyclicTest], *, window: Mapping[str, Sequence[float]] | None = None) -> MullinsFit:
+    """r, m and beta of cycles, for the law that was fitted to their first loading; window: {mode: [min, max] strain to use}."""
+    rows = [softened_rows(law, test, (window or {}).get(test.history.mode)) for test in tests]
     data = Softened(*(np.concatenate([getattr(one, name) for one in rows]) for name in Softened.__dataclass_fields__))
+    if len(data.measured) < _FEWEST or not data.measured.any():
+        raise InputError(f"{tests[0].history.source}: {len(data.measured)} row(s) of unloading with a stress are too few for the "
+                         "Mullins effect; widen the window, or take --cycles first.")
     scale, largest = float(np.mean(data.greatest)), float(np.abs(data.measured).max())
     several = bool(data.greatest.max() > _ONE_AMPLITUDE * data.greatest.min())
     count = 3 if several else 2

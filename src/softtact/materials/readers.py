@@ -24,7 +24,7 @@ from softtact.materials.columns import Specimen, find_columns, refuse_lacking
 from softtact.materials.curves import MODES, VOLUMETRIC, AnyCurve, make_curve
 from softtact.materials.cycles import CyclicTest
 from softtact.materials.history import HOLDS, order, refuse_cycles, without_holds
-from softtact.tables import number, read_bare, read_table
+from softtact.tables import number, on_one_line, read_bare, read_table
 
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
 _MARKER = "Engineering Strain"      # in the header of the layout soro_db
@@ -259,6 +259,6 @@ def _with_minus(path, rows, x, y, name):
 def _refuse_unused(columns, headers):
     """Refuse a name that `columns` maps to and that no file's header holds."""
     for name, mapped in columns.items():
-        if not any(mapped in header for header in headers):
+        if not any(on_one_line(mapped) in header for header in headers):
             raise InputError(f"`columns` maps {name} to {mapped!r}, which no file has in its header ({', '.join(headers[0])}); "
                              "correct it, or leave it out.")
