@@ -63,7 +63,8 @@ def test_import_softtact_loads_nothing_heavy_and_a_sensor_none_of_the_extras():
     first, then = (set(line.split()) for line in said.splitlines())
     assert status == 0
     assert not first & {"numpy", "scipy", "numba", "trimesh", "pydantic", "yaml", *EXTRAS}
-    assert "numba" in then and not then & set(BROUGHT_BY_EXTRAS)
+    loaded_by_others = {"pyarrow", "cascadio"}     # pandas and trimesh load them where they are
+    assert "numba" in then and not then & (set(BROUGHT_BY_EXTRAS) - loaded_by_others)
 
 
 # Names of sensors and materials

@@ -191,27 +191,10 @@ def test_a_press_that_fails_is_marked_and_the_others_stand(sensor, meshes, tmp_p
     assert arrays(tmp_path / "f.h5")["status"].tolist() == [1, 2]
 
 
-def test_an_episode_of_lerobot_is_a_press_that_did_not_fail(ours, tmp_path, monkeypatch):
-    pressed = press_data._pressed
-    monkeypatch.setattr(press_data, "_pressed", lambda plan, numbers, workers: [
-        [InputError("no")] if number == 1 else results
-        for number, results in zip(numbers, pressed(plan, numbers, workers), strict=True)])
-    assert write_press_data(tmp_path / "f.h5", ours, form="lerobot", workers=1, label="") == 1
-    rows = arrays(tmp_path / "f.h5")
-    assert rows["episode_index"].tolist() == [0, 0, 1, 1, 2, 2] and rows["index"].tolist() == list(range(6))
-    assert rows["task_index"].tolist() == [0, 0, 0, 0, 1, 1]      # objects of the presses 0, 2 and 3
-    assert np.allclose(rows["observation.state"][::2], ours.poses[[0, 2, 3]])
-
-
-def test_netcdf_has_names_and_units_and_lerobot_a_row_for_each_frame(sensor, meshes, tmp_path):
-    two = plan(sensor, meshes, presses=2, fingers=2)
-    write_press_data(tmp_path / "a.nc", two, form="netcdf", workers=1, label="")
-    write_press_data(tmp_path / "a.h5", two, form="lerobot", workers=1, label="")
-    labelled, rows = xarray.load_dataset(tmp_path / "a.nc", engine="h5netcdf"), arrays(tmp_path / "a.h5")
+def test_netcdf_has_names_and_units(sensor, meshes, tmp_path):
+    write_press_data(tmp_path / "a.nc", plan(sensor, meshes, presses=2, fingers=2), form="netcdf", workers=1, label="")
+    labelled = xarray.load_dataset(tmp_path / "a.nc", engine="h5netcdf")
     assert labelled.tactile_map.dims == ("press", "force", "finger", "row", "column") and labelled.force_n.attrs["units"] == "N"
-    assert rows["observation.tactile.left"].shape == rows["observation.tactile.right"].shape == (4, 7, 4)
-    assert rows["episode_index"].tolist() == [0, 0, 1, 1] and rows["frame_index"].tolist() == [0, 1, 0, 1]
-    assert np.array_equal(rows["observation.tactile.right"][1], labelled.tactile_map[0, 1, 1])
 
 
 def test_the_command_writes_a_data_set_that_torch_batches(tmp_path, monkeypatch, capsys):

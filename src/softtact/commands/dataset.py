@@ -11,7 +11,7 @@ from softtact.outputs import check_outputs
 EXAMPLES = """
   softtact dataset part.stl --unit mm --presses 100 --out data.h5
   softtact dataset objects/ --unit mm --presses 1000 --force 5 --force 20 --seed 7 --format netcdf --out data.nc
-  softtact dataset objects/ --unit mm --presses 1000 --fingers 2 --format lerobot --out data.h5
+  softtact dataset objects/ --unit mm --presses 1000 --fingers 2 --format lerobot --out data
   softtact dataset objects/ --unit mm --presses 1000 --cost --out data.h5      # what is left, and how long it takes
 """
 _FORCES_N = (5.0, 10.0, 20.0, 40.0)
@@ -34,12 +34,12 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="elastic by default")
     command.add_argument("--seed", type=int, default=1, help="of the drawn places (default: 1)")
     command.add_argument("--format", choices=("hdf5", "netcdf", "lerobot"), default="hdf5",
-                         help="lerobot: HDF5 with the key names of LeRobot's data sets")
+                         help="lerobot: a folder in LeRobot's format v3.0, with videos of the deformation map")
     command.add_argument("--workers", type=int, metavar="N", help="processes (default: one for each core)")
     command.add_argument("--cost", action="store_true", help="say what is left and how long it takes, and do nothing")
     command.add_argument("--out", type=Path, required=True, metavar="FILE",
-                         help="the data set; until it is whole, finished presses are in the folder FILE.part, from which the same "
-                              "command continues")
+                         help="the data set (a folder of lerobot); until it is whole, finished presses are in the folder "
+                              "FILE.part, from which the same command continues")
 
 
 def _dataset(options):

@@ -1,7 +1,7 @@
 """Movies of images: MP4 (extra `optics`) or GIF by the ending of the file's name."""
 
 import importlib.util
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +23,17 @@ def check_movie(path: str | Path) -> None:
         raise InputError(f"{path}: {how_to_install('av')}")
 
 
-def write_movie(path: str | Path, frames: Iterable[np.ndarray], *, fps: float) -> None:
+def write_movie(path: str | Path, frames: Iterable[np.ndarray], *, fps: float, options: Mapping[str, str] | None = None) -> None:
     """Write frames (height, width, 3) uint8, all of one size, whole or not at all; an MP4 loses an odd last row or column.
 
-    fps: frames a second, at least 1 in an MP4
+    fps: frames a second, at least 1 in an MP4;  options: of the encoder of an MP4, libx264
     """
     check_movie(path)
-    write = _write_gif if Path(path).suffix.lower() == ".gif" else _write_mp4
     with atomic_path(path) as temporary:
-        write(temporary, frames, fps)
+        if Path(path).suffix.lower() == ".gif":
+            _write_gif(temporary, frames, fps)
+        else:
+            _write_mp4(temporary, frames, fps, dict(options or {}))
 
 
 def _write_gif(path, frames, fps):
@@ -41,11 +43,11 @@ def _write_gif(path, frames, fps):
     first.save(path, format="GIF", save_all=True, append_images=others, duration=round(1000 / fps), loop=0)
 
 
-def _write_mp4(path, frames, fps):
+def _write_mp4(path, frames, fps, options):
     import av
 
     with av.open(str(path), "w", format="mp4") as container:
-        stream: Any = container.add_stream("libx264", rate=max(round(fps), 1))
+        stream: Any = container.add_stream("libx264", rate=max(round(fps), 1), options=options)
         stream.pix_fmt = "yuv420p"
         for number, frame in enumerate(frames):
             even = np.ascontiguousarray(frame[:frame.shape[0] // 2 * 2, :frame.shape[1] // 2 * 2])

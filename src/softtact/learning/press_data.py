@@ -1,4 +1,4 @@
-"""Data sets of random presses: HDF5, NetCDF, or LeRobot's key names.
+"""Data sets of random presses: HDF5, NetCDF, or LeRobot's format.
 
 A run that is killed, or stopped by a full disk, keeps its finished blocks of presses (`press_blocks`), from which the same call
 continues. Once all blocks are there, the data set is written, read back, compared with them, and only then gets its name.
@@ -9,11 +9,12 @@ presses have the same forces. With two fingers the object is also pressed from i
 Formats of a finished data set:
 hdf5      arrays by name: (press, force, finger, ...)
 netcdf    the same, labelled (xarray)
-lerobot   a row for each press and force, in HDF5, with the key names of LeRobot's data sets (`observation.tactile.left`,
-          `observation.force`, `episode_index`, `frame_index`, `timestamp`); an episode is a press with its forces. LeRobot
-          stores such keys in Parquet files, which its tools create.
+lerobot   a folder in LeRobot's format (`softtact.learning.lerobot`), a frame for each press and force: `observation.tactile.left`,
+          `observation.force`, `observation.state`, and a video of the deformation map, `observation.images.deformation.left`. An
+          episode is a press with its forces, a task is an object.
 """
 
+import json
 import os
 import shutil
 import zlib
@@ -32,6 +33,7 @@ import softtact
 from softtact.errors import InputError, OutputError, SofttactError
 from softtact.files import atomic_path, digest, new_hdf5, wait_for_disk, write_dataset
 from softtact.geometry.pose import Pose, draw_poses
+from softtact.learning.lerobot import FPS, same_as, write_lerobot
 from softtact.learning.press_blocks import BLOCK, PressBlocks
 from softtact.outputs import held, not_written, target_of
 from softtact.progress import progress
@@ -41,14 +43,13 @@ if TYPE_CHECKING:
 
 _BEHIND = Rotation.from_euler("y", 180, degrees=True)
 DONE, FAILED = 1, 2     # status of a press
-FORMATS = {"hdf5": (".h5", ".hdf5"), "netcdf": (".nc",), "lerobot": (".h5", ".hdf5")}
+FORMATS = {"hdf5": (".h5", ".hdf5"), "netcdf": (".nc",), "lerobot": ("",)}
 FINGERS = ("left", "right")
-_FPS = 10.0     # of the timestamps: 0.1 s between two forces, assumed because a press is quasi-static
+_PIXELS = 4     # of a picture, along a step of the deformation map
 _OF_A_BLOCK = {"deformation_map_mm": ("mm", "force", "finger", "y", "x"),
                "tactile_map": ("counts", "force", "finger", "row", "column"), "indentation_mm": ("mm", "force", "finger"),
                "within_validity": ("1", "force", "finger"), "status": ("1",), "pose": ("mm, degrees", "six"),
                "object": ("number in objects",)}     # unit and dimensions after the press
-_OF_A_FRAME = {"observation.force": "N", "observation.state": "mm, degrees", "timestamp": "s"}     # units
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,8 @@ def check_name(path: Path, form: str) -> None:
     """Refuse an unknown form, or a name without the form's ending."""
     if form not in FORMATS:
         raise InputError(f"The format {form!r} is unknown; use one of {', '.join(FORMATS)}.")
+    if form == "lerobot" and path.suffix:
+        raise InputError(f"{path}: the format lerobot is written as a folder; give a name without an ending.")
     if path.suffix.lower() not in FORMATS[form]:
         raise InputError(f"{path}: the format {form} is written as {' or '.join(FORMATS[form])}; give a name with such an ending.")
 
@@ -175,12 +178,18 @@ def _arrays(plan: PressPlan, results: Sequence[Sequence[Any]]) -> dict[str, np.n
 def _finish(part, path, form, plan, blocks):
     """Write the data set of a form from all blocks, check it, and give it its name; return the number of failed presses."""
     failed = sum(int((arrays["status"] == FAILED).sum()) for _, arrays in blocks)
-    rows = (plan.presses - failed) * len(plan.forces_n) if form == "lerobot" else plan.presses
     whole = part / f"whole{path.suffix}"
-    (_write_netcdf if form == "netcdf" else _write_hdf5)(whole, rows, form, plan, blocks)
-    _refuse_other_rows(whole, rows, form, plan, blocks)
+    if form == "lerobot":
+        if failed == plan.presses:
+            raise InputError(f"{path}: all presses failed, so that there is no episode to write; take smaller forces or "
+                             "other objects.")
+        _write_lerobot(whole, plan, blocks)
+    else:
+        (_write_netcdf if form == "netcdf" else _write_hdf5)(whole, plan, blocks)
+        _refuse_other_rows(whole, plan, blocks)
     try:
-        wait_for_disk(whole)
+        for file in [whole, *whole.rglob("*")]:
+            wait_for_disk(file)
         os.replace(whole, path)
         wait_for_disk(path.parent)
     except OSError as error:
@@ -188,45 +197,76 @@ def _finish(part, path, form, plan, blocks):
     return failed
 
 
-def _refuse_other_rows(whole, rows, form, plan, blocks):
+def _refuse_other_rows(whole, plan, blocks):
     """Read a written file back and compare it with all blocks."""
     try:
         with h5py.File(whole, "r") as file:
-            same = all(len(file[name]) == rows and file[name][part].tobytes() == values.tobytes()
-                       for part, arrays in _rows(form, plan, blocks) for name, values in arrays.items())
+            same = all(len(file[name]) == plan.presses and file[name][part].tobytes() == values.tobytes()
+                       for part, arrays in _rows(plan, blocks) for name, values in arrays.items())
     except (OSError, KeyError):
         same = False
+    _refuse_unless(same, whole)
+
+
+def _refuse_unless(same, whole):
     if not same:
         raise OutputError(f"{whole}: what was written is not what is read back; check the disk, and run again: finished presses "
                           "are kept.")
 
 
-def _rows(form, plan, blocks):
-    """(slice of the rows, {name: their values}) of each block in a form."""
-    first, of_block = 0, _as_frames if form == "lerobot" else _as_presses
+def _rows(plan, blocks):
+    """(slice of the presses, {name: their values}) of each block."""
     for numbers, arrays in blocks:
-        rows = of_block(plan, numbers, arrays, first)
-        last = first + len(next(iter(rows.values())))
-        yield slice(first, last), rows
-        first = last
+        yield (slice(numbers[0], numbers[-1] + 1),
+               arrays | {"pose": plan.poses[numbers], "object": numbers.astype(np.int32) % len(plan.meshes)})
 
 
-def _as_presses(plan, numbers, arrays, first):
-    return arrays | {"pose": plan.poses[numbers], "object": numbers.astype(np.int32) % len(plan.meshes)}
+def _write_lerobot(folder, plan, blocks):
+    """Write a data set in LeRobot's format, without failed presses, and read it back."""
+    largest = max(float(arrays["deformation_map_mm"].max()) for _, arrays in blocks)
+    fingers = FINGERS[:plan.fingers]
+    videos = [f"observation.images.deformation.{name}" for name in fingers]
+    names = {f"observation.tactile.{name}": ["row", "column"] for name in fingers} | {
+        "observation.force": ["force_n"], "observation.state": ["x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"]}
+
+    def frames():
+        first = 0
+        for numbers, arrays in blocks:
+            done = arrays["status"] == DONE
+            if done.any():
+                yield _as_frames(plan, numbers[done], {name: values[done] for name, values in arrays.items()}, first, largest)
+            first += int(done.sum()) * len(plan.forces_n)
+
+    shutil.rmtree(folder, ignore_errors=True)     # what an earlier run left unfinished
+    write_lerobot(folder, frames, length=len(plan.forces_n), tasks=[f"press {name}" for name in plan.meshes], names=names,
+                  videos=videos, robot=plan.sensor.spec.name)
+    _refuse_unless(same_as(folder, frames(), videos), folder)
+    facts = _facts(plan) | {"deformation_largest_mm": largest}
+    (folder / "meta/softtact.json").write_text(json.dumps(facts, indent=4), encoding="utf-8")
 
 
-def _as_frames(plan, numbers, arrays, first):
-    """Rows of the successful presses, one for each force."""
-    done = numbers[arrays["status"] == DONE]
-    taxels, forces = arrays["tactile_map"][arrays["status"] == DONE], len(plan.forces_n)
+def _as_frames(plan, done, arrays, first, largest_mm):
+    """Frames of the presses `done`, one for each force, of which the first has the number `first`."""
+    forces = len(plan.forces_n)
     index = first + np.arange(len(done) * forces)
-    frame = index % forces
-    rows = {f"observation.tactile.{name}": taxels[:, :, finger].reshape(len(index), *taxels.shape[3:])
-            for finger, name in enumerate(FINGERS[:plan.fingers])}
+    frame, rows = index % forces, {}
+    for finger, name in enumerate(FINGERS[:plan.fingers]):
+        of_finger = {kind: arrays[kind][:, :, finger].reshape(len(index), *arrays[kind].shape[3:])
+                     for kind in ("tactile_map", "deformation_map_mm")}
+        rows[f"observation.tactile.{name}"] = of_finger["tactile_map"].astype(np.float32)
+        rows[f"observation.images.deformation.{name}"] = _pictures(of_finger["deformation_map_mm"], largest_mm)
     return rows | {"observation.force": np.tile(np.asarray(plan.forces_n, np.float32), len(done))[:, None],
                    "observation.state": np.repeat(plan.poses[done], forces, axis=0).astype(np.float32),
-                   "episode_index": index // forces, "frame_index": frame, "timestamp": (frame / _FPS).astype(np.float32),
+                   "episode_index": index // forces, "frame_index": frame, "timestamp": (frame / FPS).astype(np.float32),
                    "index": index, "task_index": np.repeat(done % len(plan.meshes), forces).astype(np.int64)}
+
+
+def _pictures(maps_mm, largest_mm):
+    """Deformation maps (n, y, x) in mm as pictures (n, height, width, 3) uint8: viridis from 0 to the largest."""
+    from matplotlib import colormaps
+
+    shade = colormaps["viridis"](np.clip(maps_mm / max(largest_mm, 1e-12), 0, 1), bytes=True)[..., :3]
+    return shade.repeat(_PIXELS, axis=1).repeat(_PIXELS, axis=2)
 
 
 def _facts(plan):
@@ -235,25 +275,24 @@ def _facts(plan):
 
 
 def _unit(name):
-    return _OF_A_BLOCK[name][0] if name in _OF_A_BLOCK else "counts" if "tactile" in name else _OF_A_FRAME.get(name, "1")
+    return _OF_A_BLOCK[name][0] if name in _OF_A_BLOCK else "1"
 
 
-def _write_hdf5(path, rows, form, plan, blocks):
+def _write_hdf5(path, plan, blocks):
     with atomic_path(path) as temporary, new_hdf5(temporary) as file:
-        for part, arrays in _rows(form, plan, blocks):
+        for part, arrays in _rows(plan, blocks):
             for name, values in arrays.items():
                 if name not in file:
-                    file.create_dataset(name, (rows, *values.shape[1:]), values.dtype).attrs["units"] = _unit(name)
+                    file.create_dataset(name, (plan.presses, *values.shape[1:]), values.dtype).attrs["units"] = _unit(name)
                 file[name][part] = values
-        if form == "hdf5":
-            file.create_dataset("force_n", data=np.asarray(plan.forces_n, dtype=float)).attrs["units"] = "N"
-        file.attrs.update(_facts(plan) | ({"fps": _FPS} if form == "lerobot" else {}))
+        file.create_dataset("force_n", data=np.asarray(plan.forces_n, dtype=float)).attrs["units"] = "N"
+        file.attrs.update(_facts(plan))
 
 
-def _write_netcdf(path, rows, form, plan, blocks):
+def _write_netcdf(path, plan, blocks):
     import xarray
 
-    parts = [arrays for _, arrays in _rows(form, plan, blocks)]
+    parts = [arrays for _, arrays in _rows(plan, blocks)]
     arrays = {name: (("press", *dims), np.concatenate([part[name] for part in parts]), {"units": units})
               for name, (units, *dims) in _OF_A_BLOCK.items()}
     arrays["force_n"] = (("force",), np.asarray(plan.forces_n, dtype=float), {"units": "N"})
