@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softtact.cli import main
-from softtact.materials.cards import load_card, mullins_from_card, prony_from_card
+from softtact.materials.cards import law_from_card, load_card, mullins_from_card, prony_from_card
 from softtact.materials.cycles import energy_of
 from softtact.materials.laws.registry import make_law
 from softtact.materials.mullins import Mullins
@@ -60,6 +60,24 @@ def test_a_prony_series_is_added_to_a_card_and_replaced(capsys):
     assert one["laws"] == two["laws"] == load_card("card.json")["laws"]
 
 
+@pytest.mark.parametrize(("name", "over"), [("shear_modulus_kpa", 1.0), ("young_modulus_kpa", 3.0)])
+def test_a_relaxing_modulus_alone_makes_a_card_of_neo_hooke(name, over):
+    times = np.geomspace(0.01, 50, 40)
+    save("relaxation.csv", f"time_s,{name}", times, 400 * over * SERIES.relaxation(times))
+    assert main(["fit", "relaxation=relaxation.csv", "--bulk-over-shear", "50", "--plot", "card.png", "--out", "card.json"]) == 0
+    law = law_from_card(load_card("card.json"))
+    assert (law.name, law.mu0, law.bulk_modulus) == ("neo_hooke", pytest.approx(0.4, rel=1e-5), pytest.approx(20, rel=1e-5))
+    assert prony_from_card(load_card("card.json")).moduli == "instantaneous"
+
+
+def test_a_rheometers_sweep_alone_makes_a_card():
+    hz = np.geomspace(0.01, 10, 20)
+    save("dma.csv", "frequency_hz,shear_storage_modulus_kpa,shear_loss_modulus_kpa", hz, *(
+        400 * part for part in SERIES.storage_loss(2 * np.pi * hz)))
+    assert main(["fit", "frequency=dma.csv", "--out", "card.json"]) == 0
+    assert law_from_card(load_card("card.json")).mu0 == pytest.approx(0.4, rel=1e-5)
+
+
 def test_the_figure_draws_cycles_and_tests_over_time_with_labels_and_units():
     files = ["uniaxial=cycles.csv", "relaxation=relaxation.csv", "frequency=dma.csv"]
     assert main(["fit", *files, "--column", "frequency=Frequency [Hz]", "--cycles", "mullins", "--law", "neo_hooke", "--plot",
@@ -70,12 +88,14 @@ def test_the_figure_draws_cycles_and_tests_over_time_with_labels_and_units():
 
 
 @pytest.mark.parametrize(("arguments", "sentence"), [
-    (["relaxation=relaxation.csv"], "a test over time holds no law; add a curve such as uniaxial=FILE, or name the card"),
+    (["relaxation=relaxation.csv"], "its column tells no shear modulus, so there is no law; add a curve such as uniaxial=FILE"),
+    (["relaxation=relaxation.csv", "--moduli", "relaxed"], "--moduli: it has no effect on tests over time without a curve"),
+    (["relaxation=relaxation.csv", "--card", "c.json", "--material", "m"], "--material: it has no effect on tests over time"),
     (["uniaxial=cycles.csv", "--cycles", "first", "--prony", "2"], "--prony: it has no effect without a test over time"),
     (["uniaxial=cycles.csv", "--cycles", "first", "--card", "c.json"], "--card: it has no effect without a test over time"),
     (["uniaxial=cycles.csv", "relaxation=relaxation.csv", "--card", "c.json"], "a new card is fitted to uniaxial=cycles.csv"),
-    (["relaxation=relaxation.csv", "--card", "c.json", "--law", "yeoh"], "--law: it has no effect on a Prony series that is added"),
-    (["relaxation=relaxation.csv", "--card", "c.json", "--area-mm2", "2"], "--area-mm2: it has no effect on a Prony series"),
+    (["relaxation=relaxation.csv", "--card", "c.json", "--law", "yeoh"], "--law: it has no effect on tests over time without"),
+    (["relaxation=relaxation.csv", "--card", "c.json", "--area-mm2", "2"], "--area-mm2: it has no effect on tests over time"),
     (["relaxation=relaxation.csv", "--card", "c.json"], "c.json: there is no such file"),
     (["relaxation=relaxation.csv", "--card", "relaxation.csv", "--holds", "relaxed"], "--holds: it has no effect"),
     (["polyurethane", "--cycles", "mullins"], "a material's YAML names its files and options; give it without others")])

@@ -76,7 +76,7 @@ def _fit(options):
     shape, timed = _parted(options)
     refuse_overwriting(_inputs(options, config, shape, timed), {"--out": options.out, "--plot": options.plot})
     prony = _prony_fit(options, timed)
-    card, curves, tests = _elastic(options, config, shape)
+    card, curves, tests = _elastic(options, config, shape, prony)
     told = [*(misfit_warnings(card) if curves else ()), *(remark for curve in curves for remark in curve.remarks)]
     for name, found in (("mullins", _mullins_fit(options, card, tests)), ("prony", prony)):
         if found is not None:
@@ -88,21 +88,25 @@ def _fit(options):
         from softtact.studies.hybrid.figures.material_plot import plot_material
 
         plot_material(card, curves, options.plot, cycles=tests, over_time=prony.tests if prony else ())
-    lines = _fit_lines(card) if curves else [*_inelastic_lines(card), *prony.warnings]
+    lines = _fit_lines(card) if curves else [*_modulus_lines(card), *_inelastic_lines(card), *prony.warnings]
     show(card, as_json=options.json, lines=[*lines, f"written: {options.out}"])
     for warning in told:
         print(f"softtact fit: WARNING: {warning}", file=sys.stderr)
 
 
-def _elastic(options, config, shape):
-    """(card, curves, cyclic tests): fitted to the files of shape or to a material, or read from --card."""
-    from softtact.materials.card_making import make_card
+def _elastic(options, config, shape, prony):
+    """(card, curves, cyclic tests): fitted to the files of shape or to a material, read from --card, or of the modulus alone."""
+    from softtact.materials.card_making import card_of_modulus, make_card
     from softtact.materials.cards import load_card
     from softtact.materials.making import curves_of
     from softtact.materials.readers import read_curves, read_cycles
 
-    if config is None and not shape:
+    if config is None and not shape and options.card is not None:
         return load_card(options.card), [], []
+    if config is None and not shape:
+        stated = {name: getattr(options, name) for name in ("material", "bulk_over_shear") if getattr(options, name) is not None}
+        modulus = _known_modulus(options, prony)
+        return card_of_modulus(modulus, sources=[test.source for test in prony.tests], **stated), [], []
     tests, settings = [], {}
     if config is not None:
         curves, settings = curves_of(config.curve_settings), config.fit_settings
@@ -141,17 +145,24 @@ def _time_mode(text):
 
 
 def _refuse_without_shape(options):
-    """Refuse tests over time without a card, and options of laws and curves that have no effect on them."""
-    if options.card is None:
-        raise InputError(f"{options.curves[0]}: a test over time holds no law; add a curve such as uniaxial=FILE, or name the "
-                         "card to which the Prony series belongs (--card).")
+    """Refuse options of laws and curves that have no effect on tests over time alone."""
     free = ("columns", "decimal", "skip_rows", "sheet")
     idle = [name for name, value in _READING.items() if name not in free and getattr(options, name) != value]
-    idle += [name for name in ("cycles", "law", "choose", "material", "poisson", "bulk_over_shear", "window", "residual", "weight",
-                               "nonnegative", "small_strain") if getattr(options, name) is not None]
+    idle += [name for name in ("cycles", "law", "choose", "poisson", "window", "residual", "weight", "nonnegative", "small_strain",
+                               *(("material", "bulk_over_shear") if options.card else ("moduli",)))
+             if getattr(options, name) is not None]
     if idle:
-        raise InputError(f"--{idle[0].replace('_', '-')}: it has no effect on a Prony series that is added to a card; leave it "
+        raise InputError(f"--{idle[0].replace('_', '-')}: it has no effect on tests over time without a curve of shape; leave it "
                          "out.")
+
+
+def _known_modulus(options, prony):
+    """The instantaneous shear modulus, MPa, that the tests over time tell; refused where none does."""
+    if prony.shear_modulus_mpa is None:
+        raise InputError(f"{options.curves[0]}: its column tells no shear modulus, so there is no law; add a curve such as "
+                         "uniaxial=FILE, name the card to which the Prony series belongs (--card), or name the column "
+                         "shear_modulus_mpa, young_modulus_mpa or shear_storage_modulus_mpa, if it is one.")
+    return prony.shear_modulus_mpa
 
 
 def _prony_fit(options, timed):
@@ -217,7 +228,8 @@ def _of_time_tests():
     """Names of columns that only tests over time have."""
     from softtact.materials.columns import FREQUENCIES, LOSS, STORAGE, TIMES
 
-    return {*TIMES, *FREQUENCIES, *STORAGE, *LOSS, "time", "frequency", "storage_modulus", "loss_modulus"}
+    return {*TIMES, *FREQUENCIES, *STORAGE, *LOSS, "time", "frequency", "storage_modulus", "loss_modulus",
+            "shear_storage_modulus", "shear_loss_modulus"}
 
 
 def _refuse_idle(options, curves, settings):
@@ -258,6 +270,12 @@ def _fit_lines(card):
     yield f"bulk modulus: {card['bulk_source']}"
     yield from _inelastic_lines(card)
     yield from card["warnings"]
+
+
+def _modulus_lines(card):
+    """The line on the chosen law of a card without curves of shape."""
+    constants = ", ".join(f"{name} {value:.4g}" for name, value in card["laws"][card["chosen"]]["parameters"].items())
+    yield f"{card['chosen']}: {constants}"
 
 
 def _inelastic_lines(card):

@@ -128,6 +128,19 @@ def make_card(curves: Sequence[AnyCurve], *, material: str = "material", printed
     return card
 
 
+def card_of_modulus(shear_modulus_mpa: float, *, sources: Sequence[str], material: str = "material",
+                    bulk_over_shear: float = 20.0) -> dict[str, Any]:
+    """The card of a material of which tests tell the shear modulus at small strain alone: neo-Hooke, with K / mu0 as stated."""
+    bulk = bulk_modulus(None, bulk_over_shear=CardOptions(bulk_over_shear=bulk_over_shear).bulk_over_shear)
+    modulus = bulk.of(shear_modulus_mpa)
+    entry = {"parameters": {"c10": shear_modulus_mpa / 2}, "mu0_mpa": shear_modulus_mpa, "bulk_modulus_mpa": modulus,
+             "d_per_mpa": [2 / modulus], "d_source": bulk.source,
+             "small_strain": small_strain_constants(shear_modulus_mpa, modulus)}
+    return {"material": material, "kind": "measured", "curves": [{"source": source} for source in sources], "strain_window": {},
+            "bulk_source": bulk.source, "chosen": "neo_hooke", "ranking": ["neo_hooke"], "laws": {"neo_hooke": entry},
+            "warnings": ["No curve of shape was given: neo_hooke has the shear modulus of small strains, and holds for these."]}
+
+
 def misfit_warnings(card: dict[str, Any]) -> list[str]:
     """A sentence on a chosen law that misses its curves by more than `LARGEST_ERROR`, in a list that is empty otherwise."""
     error = card["laws"][card["chosen"]]["relative_error"]

@@ -24,8 +24,9 @@ MILLIMETRES = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1e3, "in": _INCH_MM}
 SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 HERTZ = {"hz": 1.0, "khz": 1e3, "rad_s": 1 / (2 * math.pi)}
 # Quantity whose name has no unit -> its units, factors to MPa, N, mm, s or Hz.
-BASES = dict.fromkeys(("nominal_stress", "true_stress", "shear_stress", "pressure", "relaxation_modulus", "storage_modulus",
-                       "loss_modulus"), MEGAPASCALS) | {
+BASES = dict.fromkeys((
+    "nominal_stress", "true_stress", "shear_stress", "pressure", "relaxation_modulus", "shear_modulus", "young_modulus",
+    "storage_modulus", "loss_modulus", "shear_storage_modulus", "shear_loss_modulus"), MEGAPASCALS) | {
     "force": NEWTONS, "extension": MILLIMETRES, "time": SECONDS, "frequency": HERTZ}
 _PERCENT = {name: f"{name}_percent" for name in ("engineering_strain", "volumetric_strain", "shear_strain")}
 # A unit as it is written -> its name above. Case matters: mPa is not MPa.
@@ -91,11 +92,14 @@ SHEAR_STRESSES = (_with_units("shear_stress", lambda value, x, specimen: value) 
 PRESSURES = _with_units("pressure", lambda value, x, specimen: value)
 # Over time: the stress after a step of strain, in any measure that is proportional to the modulus; and the moduli in frequency.
 TIMES = _with_units("time", lambda value: value)
-_OVER_TIME = ("relaxation_modulus", "nominal_stress", "true_stress", "shear_stress", "force")
+_OVER_TIME = ("relaxation_modulus", "shear_modulus", "young_modulus", "nominal_stress", "true_stress", "shear_stress", "force")
 RELAXING = {name: convert for base in _OVER_TIME for name, convert in _with_units(base, lambda value: value).items()} | {
     "normalised_modulus": lambda value: value}
 FREQUENCIES = _with_units("frequency", lambda value: value)
-STORAGE, LOSS = (_with_units(base, lambda value: value) for base in ("storage_modulus", "loss_modulus"))
+STORAGE, LOSS = (_with_units(f"{kind}_modulus", lambda value: value) | _with_units(f"shear_{kind}_modulus", lambda value: value)
+                 for kind in ("storage", "loss"))
+# Beginning of a name of these -> the shear modulus of an incompressible material over the modulus; of the others it is not known.
+SHEAR_OVER = {"shear_modulus": 1.0, "young_modulus": 1 / 3, "shear_storage_modulus": 1.0}
 _OF_MODE = {VOLUMETRIC: ((VOLUMES, "volume"), (PRESSURES, "pressure")),
             SIMPLE_SHEAR: ((SHEARS, "shear strain"), (SHEAR_STRESSES, "stress"))}
 _OF_SHAPE = ((STRETCHES, "stretch"), (STRESSES, "stress"))

@@ -52,8 +52,15 @@ class PronyFit:
     tests: tuple = ()
 
     @property
+    def shear_modulus_mpa(self) -> float | None:
+        """Instantaneous shear modulus by the tests whose measure tells it; None without one."""
+        known = [scale * test.shear_over for scale, test in zip(self.scales, self.tests, strict=True) if test.shear_over]
+        return float(np.mean(known)) if known else None
+
+    @property
     def warnings(self) -> Iterator[str]:
         """Sentences on what the data do not determine, and on data that contradict each other."""
+        yield from (remark for test in self.tests for remark in test.remarks)
         low, high = self.window_s
         for k, tau in enumerate(self.series.tau_s, 1):
             if not low <= tau <= high:

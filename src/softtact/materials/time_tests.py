@@ -13,7 +13,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.materials.checks import refuse_first
-from softtact.materials.columns import FREQUENCIES, LOSS, RELAXING, STORAGE, TIMES, find_quantities
+from softtact.materials.columns import FREQUENCIES, LOSS, RELAXING, SHEAR_OVER, STORAGE, TIMES, find_quantities
 from softtact.materials.prony import PronySeries
 from softtact.tables import number, read_table
 
@@ -27,12 +27,14 @@ class TimeTest:
 
     mode: "relaxation" or "frequency";  at: (n,) times in s, or frequencies in Hz, rising
     values: (k, n) the modulus over time, or storage and loss modulus; in one unit, all positive
+    shear_over: the shear modulus in MPa over these values, None where their measure does not tell
     """
 
     mode: str
     at: np.ndarray
     values: np.ndarray
     source: str = ""
+    shear_over: float | None = None
     remarks: tuple = ()
 
     @property
@@ -73,7 +75,8 @@ def _read(path, mode, columns, reading):
     if len(rows) < 4:
         raise InputError(f"{path}: {len(rows)} row(s) are too few for a test of {mode}; give at least four.")
     remarks = tuple(f"{path}: {remark}" for remark in table.remarks)
-    return _checked(path, rows, TimeTest(mode, values[0], values[1:], Path(path).name, remarks))
+    shear_over = next((factor for base, factor in SHEAR_OVER.items() if found[1].name.startswith(base)), None)
+    return _checked(path, rows, TimeTest(mode, values[0], values[1:], Path(path).name, shear_over, remarks))
 
 
 def _checked(path, rows, test):
