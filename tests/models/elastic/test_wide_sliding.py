@@ -257,3 +257,19 @@ def test_it_does_what_the_dense_model_does(small_sheet):
         error, largest = step.displacement_mm[::2, ::2] - expected, np.abs(expected).max()
         assert np.abs(error).max() < 0.04 * largest and np.sqrt((error**2).mean()) < 0.005 * largest
     np.testing.assert_allclose([step.dissipated_mj for step in steps], dense.dissipated_mj, atol=0.02 * dense.work_mj[-1])
+
+
+@pytest.mark.parametrize("shape", ["facet", "edge", "corner", "box"])
+def test_an_object_of_facets_settles_under_a_load_whatever_touches_first(shape):
+    """Few points under a small load: none of them may pull while the contact is sought."""
+    ball = trimesh.creation.icosphere(2, radius=6.0)
+    lowest = {"facet": ball.face_normals[0], "corner": ball.vertex_normals[0],
+              "edge": ball.vertices[ball.edges_unique[0]].sum(axis=0), "box": None}
+    mesh = trimesh.creation.box((3.0, 3.0, 2.0)) if shape == "box" else ball.apply_transform(
+        trimesh.geometry.align_vectors(lowest[shape], (0, 0, -1)))
+    surface = HeightField(mesh.apply_translation((0, 0, -mesh.bounds[0, 2])))
+    line = np.linspace(-4, 4, 65)
+    for load in (0.01, 0.5, 5.0):
+        layer = WideLayer.with_constants(4.0, 0.05, 0.48, (line[1] - line[0],) * 2, (65, 65))
+        mover = WideObject(layer, surface, (line, line), first_touch_mm=surface.first_touch_mm(line, line), friction=0.5)
+        assert -mover.follow(MotionStep(loads={"z": -load}), load).force_n[..., 2].sum() == pytest.approx(load, rel=1e-9)

@@ -219,5 +219,8 @@ class GridSolver:
 
 
 def _loaded(p, active, load):
-    """Forces p on the active set, raised evenly to the load where one is given."""
-    return p if load is None else p + active * ((load - p.sum()) / active.sum())
+    """Forces p on the active set, which do not pull, in proportion scaled to the load where one is given; else even."""
+    if load is None:
+        return p
+    total = p.sum()     # an even change would let the weakest pull
+    return p * (load / total) if total > 0 else active * (load / active.sum())
