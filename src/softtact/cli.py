@@ -8,7 +8,9 @@ import argparse
 import os
 import re
 import sys
+import warnings
 from collections.abc import Sequence
+from functools import partial
 
 import softtact
 from softtact.commands import (
@@ -55,7 +57,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         argcomplete.autocomplete(parser)
     options = parser.parse_args(arguments)
     options.given = list(sys.argv[1:] if arguments is None else arguments)
-    return run_to_status(f"softtact {options.command}", lambda: options.run(options))
+    with warnings.catch_warnings():
+        warnings.showwarning = partial(_show_warning, options.command, set())   
+        return run_to_status(f"softtact {options.command}", lambda: options.run(options))
+
+
+def _show_warning(command, shown, message, category, filename, lineno, file=None, line=None):
+    """A warning in one line without the place in the code, once."""
+    text = f"softtact {command}: WARNING: {message}"
+    if text not in shown:
+        shown.add(text)
+        print(text, file=file or sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -19,14 +19,15 @@ pytestmark = [needs_ccx, pytest.mark.slow]
 THICK_MM, RADIUS_MM, FRICTION = 2.0, 8.0, 0.5
 LAW = make_law("neo_hooke", {"c10": 0.075}, bulk_over_shear=20)
 MOTION = Motion().step(ways={"z": -0.1}).step(ways={"x": 0.05}).step(ways={"x": 0.1})
-LINES = np.array([0, 0.25, 0.5, 0.75, 1.0, 1.35, 2.2, 4.0])      # mm from the middle: ends of elements
+LINES = np.array([0, 0.25, 0.5, 0.75, 1.0, 1.35, 2.2, 4.0, 7.0])      # mm from the middle: ends of elements
 
 
 def half_a_layer_under_a_ball():
-    """Half of a layer of 8 x 8 x 2 mm, held below, y >= 0, under a stiff paraboloid foot that just touches it."""
+    """Half of a layer of 14 x 14 x 2 mm, held below, y >= 0, under a stiff paraboloid foot that just touches it."""
     line, levels = np.concatenate([-LINES[:0:-1], LINES]), np.array([0, 0.8, 1.5, 2.0])
-    mesh = box((-4, 0, 0), (4, 4, THICK_MM), (len(line) - 1, len(LINES) - 1, len(levels) - 1),
-               grading=[(line + 4) / 8, LINES / 4, levels / THICK_MM])
+    half = LINES[-1]
+    mesh = box((-half, 0, 0), (half, half, THICK_MM), (len(line) - 1, len(LINES) - 1, len(levels) - 1),
+               grading=[(line + half) / (2 * half), LINES / half, levels / THICK_MM])
     foot = cylinder(1.4, 0.4, (10, 1)).moved(
         lambda x: x + np.outer((x[:, :2]**2).sum(axis=1) / (2 * RADIUS_MM), [0, 0, 1.0]) + [0, 0, THICK_MM])
     both = mesh.joined(foot, prefix="foot ")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.sensors import CORO
 
-from softtact.commands.press import _count_lines
+from softtact.commands.press_summary import _table_on_layers
 from softtact.press.count_error import ELASTIC, FOUNDATION, hyperelastic_counts, mean_depth
 from softtact.press.result import PressResult, read_press
 from softtact.readout.capacitance import ideal_counts
@@ -88,7 +88,12 @@ def test_a_file_of_an_earlier_version_is_read_without_it(tmp_path):
     assert np.isnan(read_press(tmp_path / "old.nc").hyperelastic_counts).all()
 
 
-def test_the_command_states_the_counts_and_the_share_by_which_they_differ():
-    summary = {"normal_force_n": [20.0], "tactile_map": [[[1000.0, 1000.0], [900.0, 100.0]]],
+def test_the_command_states_the_counts_that_the_hyperelastic_model_would_give():
+    summary = {"normal_force_n": [20.0], "indentation_mm": [0.1], "contact_area_mm2": [4.0], "largest_deformation_mm": [0.1],
+               "within_validity": [1], "iterations": [3], "tactile_map": [[[1000.0, 1000.0], [900.0, 100.0]]],
                "hyperelastic_counts": [[1600.0, 1800.0, 2000.0]]}
-    assert list(_count_lines(summary)) == ["counts to expect of the hyperelastic model at 20 N: 1800 (1600 to 2000), 40% less"]
+    head, line = _table_on_layers(summary)
+    assert "counts if hyperelastic" in head
+    assert " ".join(line.split()) == "20 0.100 4.0 0.100 3000 1800 (1600 to 2000) yes"
+    unknown = summary | {"hyperelastic_counts": [[None, None, None]]}
+    assert "hyperelastic" not in next(_table_on_layers(unknown))

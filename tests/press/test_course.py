@@ -12,6 +12,7 @@ from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.newton import _Press
 from softtact.press import choice
 from softtact.press.sensor import Sensor
+from softtact.words import plain
 
 BALL = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
 
@@ -98,9 +99,8 @@ def test_a_model_is_taken_only_where_nine_of_ten_presses_like_it_are_within_the_
     assert chosen(tolerance_mm=1.01 * times * expected).model == "elastic"
     between = chosen(tolerance_mm=0.5 * (1.0 + times) * expected)
     assert between.model != "elastic"
-    um, tolerance_um = 1e3 * expected, 0.5e3 * (1.0 + times) * expected
-    assert f"elastic {um:.3g} (90 % below {times * um:.3g}) um" in between.selection_reason
-    assert f"asked for {tolerance_um:.3g} um" in between.selection_reason
+    assert f"elastic {plain(expected)} (90 % below {plain(times * expected)}) mm" in between.selection_reason
+    assert f"asked for {plain(0.5 * (1.0 + times) * expected)} mm" in between.selection_reason
 
 
 def test_a_model_that_does_not_hold_is_not_taken_whatever_error_it_tells(fakes):

@@ -22,7 +22,8 @@ from softtact.commands.common import (
     show,
 )
 from softtact.commands.press_each import ON_LAYERS, ON_SOLIDS, Files, is_several, press_each
-from softtact.commands.press_gel import add_images, check_images, gel_lines, is_image, summary_of_gel, write_images
+from softtact.commands.press_gel import add_images, check_images, is_image, summary_of_gel, write_images
+from softtact.commands.press_summary import lines_on_layers, lines_on_solids, or_none, summary_on_layers, summary_on_solids
 from softtact.errors import ConvergenceError, InputError
 from softtact.outputs import check_outputs, refuse_overwriting
 
@@ -83,6 +84,8 @@ def add(commands: argparse._SubParsersAction) -> None:
                               "others' surface")
     command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels (PNG or SVG)")
     add_images(command)
+    command.add_argument("--verbose", action="store_true",
+                         help="also tell how the solver did: iterations, overlaps, unbalanced forces")
     command.add_argument("--full-scale", action="store_true",
                          help="let the taxels' colours in --plot end at the readout's largest count, not at the data's")
 
@@ -120,7 +123,8 @@ def _press(options):
     if several:
         return press_each(options, press, ON_LAYERS if spec.has_layers else ON_SOLIDS)
     summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot, options.image, options.movie))
-    show(summary, as_json=options.json, lines=_lines_on_layers(summary) if spec.has_layers else _lines_on_solids(summary))
+    lines = lines_on_layers if spec.has_layers else lines_on_solids
+    show(summary, as_json=options.json, lines=lines(summary, verbose=options.verbose))
     if error:
         raise error
 
@@ -226,6 +230,9 @@ def _how(options, spec):
                                  "forces, for which auto is the hyperelastic model; leave it out.")
         return {"motion": motion}
     forces = sorted(set(options.force))
+    if forces != options.force:
+        rising = ", ".join(f"{force:g}" for force in forces)
+        print(f"softtact press: the forces are pressed in rising order, each once: {rising} N.", file=sys.stderr)
     check_forces(forces, spec)
     return {"force_n": forces}
 
@@ -250,8 +257,8 @@ def _written(result, files, options, sensor):
     if options.card and result.model == "elastic":
         print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
               "name another model to use it.", file=sys.stderr)
-    summary = _summary_on_layers(result) if result.deformation_map_mm is not None else _summary_on_solids(result)
-    others = {name: _or_none(reading.values) for name, reading in result.readings.items()
+    summary = summary_on_layers(result) if result.deformation_map_mm is not None else summary_on_solids(result)
+    others = {name: or_none(reading.values) for name, reading in result.readings.items()
               if name not in ("taxels", "points") and not is_image(reading)}
     facts = {"repairs": [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair], "readings": others}
     return summary | facts | summary_of_gel(result) | {"written": [str(path) for path in files.all if path]}
@@ -267,146 +274,3 @@ def _cards(options, spec):
             raise InputError(f"--card {layer}={path}: the layer is {layer!r}; give dielectric or cover.")
         laws[layer] = law_from_card(load_card(path))
     return laws
-
-
-def _summary_on_layers(result):
-    """The results of a press at each load step, as plain JSON values."""
-    load_steps = {"normal_force_n": result.normal_force_n, "force_n": result.force_n, "indentation_mm": result.indentation_mm,
-              "contact_area_mm2": result.contact_area_mm2,
-              "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2))}
-    if "taxels" in result.readings:
-        load_steps |= {"tactile_map": result.tactile_map, "taxels_at_range_end": result.taxels_at_range_end}
-    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "extrapolated_volume_fraction", "expected_error_mm",
-             "within_validity", "validity_reason", "iterations", "wall_time_s")
-    load_steps |= {name: getattr(result, name) for name in names}
-    load_steps |= {name: getattr(result, name) for name in ("torque_nmm", "hyperelastic_counts", "expected_error_counts")}
-    facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
-    facts["expected_error_interval"] = ([result.attributes[f"expected_error_times_{end}"] for end in ("low", "high")]
-                                        if "expected_error_times_low" in result.attributes else None)
-    facts["expected_error_calibrated_on"] = result.attributes.get("expected_error_calibrated_on")
-    facts |= {"sensor": result.sensor, "largest_counts": result.largest_counts}
-    return facts | _times(result) | {name: _or_none(values) for name, values in load_steps.items()}
-
-
-def _times(result):
-    """The steps' times, where they have durations."""
-    return {} if result.time_s is None else {"time_s": _or_none(result.time_s)}
-
-
-def _time_column(summary):
-    """Head and cells of a column of the steps' times; without durations empty."""
-    times = summary.get("time_s")
-    return (f"{'time, s':>10}", [f"{time:10.4g}" for time in times]) if times else ("", [""] * len(summary["iterations"]))
-
-
-def _summary_on_solids(result):
-    """The results of a press on a sensor of kind solid at each load step, as plain JSON values."""
-    import numpy as np
-
-    values = {"load": result.load("object"), "way_mm": result.frame_way_mm[:, result.frames.index("object")],
-              "largest_displacement_mm": np.nanmax(np.linalg.norm(result.displacement_mm, axis=2), axis=1),
-              "largest_pressure_mpa": np.nanmax(result.contact_pressure_mpa, axis=(1, 2))}
-    names = ("volume_ratio_range", "stretch_range", "extrapolated_volume_fraction", "penetration_mm", "residual_n", "iterations",
-             "increments", "reading_points_mm", "reading_displacement_mm", "reading_pressure_mpa", "wall_time_s")
-    return {"model": result.model} | _times(result) | {name: _or_none(value) for name, value in
-                                      (values | {name: getattr(result, name) for name in names}).items()}
-
-
-def _or_none(values):
-    """Numbers as lists, with null for nan, which JSON does not have; nan marks values that a model does not compute."""
-    if values.ndim > 1:
-        return [_or_none(row) for row in values]
-    return [None if value != value else value for value in values.tolist()]
-
-
-def _lines_on_layers(summary):
-    yield f"model: {summary['model']}, linear solver: {summary['solver']}"
-    if summary["selection_reason"]:
-        yield f"chosen because: {summary['selection_reason']}"
-    if "tactile_map" not in summary:
-        yield from gel_lines(summary)
-        yield from _quality_lines(summary)
-        return
-    head, times = _time_column(summary)
-    yield f"{head}{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
-    names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm")
-    counts = (sum(map(sum, one)) for one in summary["tactile_map"])
-    for time, force, depth, area, deepest, total in zip(times, *(summary[name] for name in names), counts, strict=True):
-        yield f"{time}{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{total:14.0f}"
-    yield from _quality_lines(summary)
-
-
-def _error_line(summary):
-    """The expected error of a fast model against the hyperelastic model, with an interval for the true error."""
-    interval, expected_um = summary["expected_error_interval"], 1e3 * max(summary["expected_error_mm"])
-    if interval is None:
-        return
-    low, high = (factor * expected_um for factor in interval)
-    known_of = summary["expected_error_calibrated_on"]
-    other = f"; calibrated on the sensor {known_of}, not on {summary['sensor']}" if known_of != summary["sensor"] else ""
-    yield (f"error to expect against the hyperelastic model: {expected_um:.2g} um ({low:.2g} to {high:.2g}), root mean square over "
-           f"the map{other}")
-
-
-def _range_line(summary):
-    """The load steps at which taxels read the end of the converter's range: there the true change is larger than the counts."""
-    numbers = summary.get("taxels_at_range_end", [])
-    if any(numbers):
-        steps = ", ".join(f"{number:g} at {force:.4g} N" for number, force in zip(numbers, summary["normal_force_n"], strict=True)
-                          if number)
-        yield f"taxels at the end of the converter's range ({summary['largest_counts']:g} counts), which read too little: {steps}"
-
-
-def _count_lines(summary):
-    """The error to expect in counts of all taxels, at each load step."""
-    steps = zip(summary["normal_force_n"], summary["tactile_map"], summary["hyperelastic_counts"], strict=True)
-    for force, counts, (low, middle, high) in steps:
-        read = sum(map(sum, counts))
-        share = f", {abs(read - middle) / read:.0%} {'less' if read > middle else 'more'}" if read > 0 else ""
-        yield f"counts to expect of the hyperelastic model at {force:.4g} N: {middle:.0f} ({low:.0f} to {high:.0f}){share}"
-
-
-def _validity_lines(summary):
-    """The forces of the flagged load steps, a line for each reason."""
-    from softtact.press.validity import by_reason
-
-    for reason, forces in by_reason(*(summary[name] for name in ("normal_force_n", "within_validity", "validity_reason"))).items():
-        yield f"beyond what the model is valid for: {', '.join(f'{force:.4g}' for force in forces)} N: {reason}"
-
-
-def _quality_lines(summary):
-    """The quality of the solution, as the worst of the load steps."""
-    yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
-    if None not in summary["residual_n"]:
-        yield f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N"
-    if None not in summary["frustum_compression_mm"]:
-        yield f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm"
-    if None not in summary["expected_error_mm"]:
-        yield from _error_line(summary)
-    if None not in summary["expected_error_counts"]:
-        yield from _count_lines(summary)
-    yield from _range_line(summary)
-    yield from _validity_lines(summary)
-    if None not in summary["extrapolated_volume_fraction"]:
-        yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a layer"
-    yield from (f"written: {path}" for path in summary["written"])
-
-
-def _lines_on_solids(summary):
-    head, times = _time_column(summary)
-    yield f"{head}{'force x, y, z, N':>33}{'displacement x, y, z, mm':>33}{'most moved, mm':>16}{'pressure, MPa':>15}"
-    names = ("load", "way_mm", "largest_displacement_mm", "largest_pressure_mpa")
-    for time, load, displacement, moved, pressure in zip(times, *(summary[name] for name in names), strict=True):
-        yield time + "".join(f"{value:11.3g}" for value in (*load[:3], *displacement)) + f"{moved:16.4f}{pressure:15.4g}"
-    if summary["reading_points_mm"]:
-        yield "readings at the last step:"
-        yield f"{'point x, y, z, mm':>33}{'displacement x, y, z, mm':>33}{'pressure, MPa':>15}"
-        read = (summary[f"reading_{name}"][-1] for name in ("displacement_mm", "pressure_mpa"))
-        for point, moved, pressure in zip(summary["reading_points_mm"], *read, strict=True):
-            shown = "-" if pressure is None else f"{pressure:.4g}"
-            yield "".join(f"{value:11.3g}" for value in (*point, *moved)) + f"{shown:>15}"
-    yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
-    yield f"largest unbalanced force: {max(summary['residual_n']):.2g} N"
-    if None not in summary["extrapolated_volume_fraction"]:
-        yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a region"
-    yield from (f"written: {path}" for path in summary["written"])

@@ -38,15 +38,27 @@ def _counts(summary):
     return float(sum(map(sum, summary["tactile_map"][-1]))) if "tactile_map" in summary else float("nan")
 
 
+def _last_or_nan(key):
+    """A function that gives the value of a key at the last load step; nan where the summary has none."""
+    def value(summary: dict[str, Any]) -> float:
+        found = summary[key][-1] if key in summary else None
+        return float("nan") if found is None else float(found)
+
+    return value
+
+
 def _force(axis, place):
     return Column(f"force_{axis}_n", f"force {axis}, N", "12.4g", lambda summary: float(summary["load"][-1][place]))
 
 
 ON_LAYERS = (Column("force_n", "force, N", "9.4g", last("normal_force_n")),
-             Column("indentation_mm", "indentation, mm", "17.4f", last("indentation_mm")),
+             Column("indentation_mm", "depth, mm", "12.4f", last("indentation_mm")),
              Column("contact_area_mm2", "contact, mm2", "14.1f", last("contact_area_mm2")),
-             Column("largest_deformation_mm", "deepest, mm", "13.4f", last("largest_deformation_mm")),
-             Column("counts", "counts, sum", "13.0f", _counts))
+             Column("largest_deformation_mm", "most deformed, mm", "19.4f", last("largest_deformation_mm")),
+             Column("counts", "counts", "9.0f", _counts),
+             Column("expected_error_mm", "error, mm", "11.4f", _last_or_nan("expected_error_mm")),
+             Column("taxels_at_range_end", "at end", "8.0f", _last_or_nan("taxels_at_range_end")),
+             Column("valid", "valid", "7.0f", last("within_validity")))
 ON_SOLIDS = (*(_force(axis, place) for place, axis in enumerate("xyz")),
              Column("largest_displacement_mm", "most moved, mm", "16.4f", last("largest_displacement_mm")),
              Column("largest_pressure_mpa", "pressure, MPa", "15.4g", last("largest_pressure_mpa")))

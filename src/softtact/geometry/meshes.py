@@ -85,8 +85,8 @@ def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
     _refuse_overlapping(path, mesh)
 
 
-def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Refuse facets that lie on their neighbour, as in a concave polygon that was triangulated from one corner.
+def folded(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of facets (n, 2) of which one lies on the other, and the middles (n, 3) in mm of their edges.
 
     mesh : consistently oriented, so that the normals of two facets that lie on each other are opposite
     """
@@ -95,11 +95,18 @@ def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
     edges = mesh.vertices[mesh.face_adjacency_edges[opposite]]                         # (n, 2, 3)
     areas = mesh.area_faces[mesh.face_adjacency[opposite]].min(axis=1)
     heights = 2 * areas / np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    folded = heights > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
-    if folded.any():
-        x, y, z = edges[folded.argmax()].mean(axis=0)
-        raise InputError(f"{path}: {folded.sum()} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as in "
-                         "concave polygons that were triangulated from one corner; triangulate it again in its modelling program.")
+    thick = heights > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
+    return mesh.face_adjacency[opposite[thick]], edges[thick].mean(axis=1)
+
+
+def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Refuse facets that lie on their neighbour, as in a concave polygon that was triangulated from one corner, or a rough scan."""
+    pairs, places = folded(mesh)
+    if len(pairs):
+        x, y, z = places[0]
+        raise InputError(f"{path}: {len(pairs)} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as in "
+                         "concave polygons that were triangulated from one corner, or in a scan whose noise is as large as its "
+                         "facets; triangulate it again in its modelling program, or smooth the scan.")
 
 
 def merge_facets(triangles: np.ndarray) -> trimesh.Trimesh:

@@ -2,8 +2,8 @@
 
 Repaired: facets without finite corners or without area, repeated facets, corners that differ by round-off or lie on an edge of a
 facet without them (T-junctions), holes that are flat or small, facets oriented against their neighbours, bodies inside out, bodies
-that overlap. Not repaired: large curved holes, edges where more than two walls meet, facets that lie on their
-neighbours, double-sided bodies, flat or empty meshes, sizes that no body on a sensor has.
+that overlap, a few small facets of a scan that its noise laid on their neighbours. Not repaired: large curved holes, edges where
+more than two walls meet, other facets that lie on their neighbours, double-sided bodies, flat or empty meshes, sizes that no body on a sensor has.
 `meshes.read_mesh` then checks the result as it checks any mesh.
 """
 
@@ -20,6 +20,7 @@ from softtact.geometry.meshes import (
     MIN_SIZE_MM,
     OVERLAP,
     check_body,
+    folded,
     is_cavity,
     load_sized,
     merge_facets,
@@ -33,6 +34,9 @@ from softtact.geometry.polygons import triangulated
 
 _APART = 1e-5        # of the size: closer corners are one point with different rounding
 _FLAT_HOLE = 1e-3    # of the size: largest distance of a hole's rim from its plane
+_FEW_FOLDS = 0.01    # of the facets: those that noise may have laid on their neighbours
+_SMALL_FACETS = 0.05 # of the size: their longest edges
+_SMOOTHINGS = 20     # of their corners, until none lies on another
 _SMALL_HOLES = 0.05  # of the surface: area of curved holes that are also closed by plane pieces
 
 
@@ -60,6 +64,7 @@ def read_mended(path: str | Path, *, unit: str | None = None, min_size_mm: float
         check_body(path, mesh)
     except InputError:
         return Mended(_mended(path, mesh, repairs), repairs, list(stored.notes))
+    mesh = _smooth_folds(mesh, repairs)
     refuse_folded(path, mesh)
     return Mended(mesh, repairs, list(stored.notes))
 
@@ -69,6 +74,7 @@ def _mended(path, mesh, repairs):
     _refuse_double_sided(path, mesh)
     for step in (_join_corners, _split_at_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies):
         mesh = step(mesh, repairs)
+    mesh = _smooth_folds(mesh, repairs)
     try:
         refuse_folded(path, mesh)     # before the union, which may leave slits thinner than round-off
         mesh = _unite(mesh, repairs)
@@ -85,6 +91,35 @@ def _finite(triangles, repairs):
     if not good.all():
         repairs.append(f"left out {_count(~good, 'facet')} whose coordinates are not finite numbers")
     return triangles[good]
+
+
+def _smooth_folds(mesh, repairs):
+    """Move the corners of small facets that lie on a neighbour to the mean of their neighbours, where those are few; else nothing.
+
+    Noise of a scanner as large as its facets lays some of them over. Large facets are another fault, which smoothing would hide.
+    """
+    smooth, first, neighbours = mesh, len(folded(mesh)[0]), None
+    for _ in range(_SMOOTHINGS):
+        pairs, _ = folded(smooth)
+        if not len(pairs):
+            break
+        if len(pairs) > _FEW_FOLDS * len(mesh.faces):
+            return mesh
+        corners = np.unique(smooth.faces[pairs.ravel()])
+        edges = smooth.vertices[smooth.faces[pairs.ravel()]]
+        if np.linalg.norm(edges - np.roll(edges, 1, axis=1), axis=2).max() > _SMALL_FACETS * _size(mesh):
+            return mesh
+        neighbours = neighbours or mesh.vertex_neighbors
+        vertices = np.array(smooth.vertices)
+        vertices[corners] = [smooth.vertices[neighbours[corner]].mean(axis=0) for corner in corners]
+        smooth = trimesh.Trimesh(vertices, mesh.faces, process=False)
+    else:
+        return mesh
+    if first:
+        moved = np.linalg.norm(smooth.vertices - mesh.vertices, axis=1)
+        repairs.append(f"smoothed {_number(first, 'fold')} of small facets, as noise of a scan makes them: {_count(moved > 0, 'corner')}"
+                       f" moved by up to {moved.max():.2g} mm")
+    return smooth
 
 
 def _join_corners(mesh, repairs):

@@ -27,6 +27,7 @@ from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
+from softtact.words import plain
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -192,9 +193,9 @@ def _by_error(sensor, placed, forces, tolerance_mm, control):
             remarks.append(f"the {name} model does not hold from {result.normal_force_n[first]:g} N on{why}")
     mostly = {name: INTERVALS[name][1] * values for name, values in errors.items()}
     model = cheapest(mostly, tolerance_mm)
-    in_um = [f"{name} {1e3 * values.max():.3g} (90 % below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()
-            if np.isfinite(values).all()]
-    reason = "; ".join([f"expected errors: {', '.join(in_um)}; asked for {1e3 * tolerance_mm:.3g} um" if in_um else
+    stated = [f"{name} {plain(values.max())} (90 % below {plain(mostly[name].max())}) mm" for name, values in errors.items()
+              if np.isfinite(values).all()]
+    reason = "; ".join([f"expected errors: {', '.join(stated)}; asked for {plain(tolerance_mm)} mm" if stated else
                         "no fast model gives an error", *remarks])
     if sensor.spec.name != CALIBRATED_ON:
         reason += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"

@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter
 
 from softtact.models.hyperelastic.newton import FULL_POCKET
 from softtact.press.result import PressResult
+from softtact.words import plain
 
 Flags = Mapping[str, np.ndarray]
 
@@ -89,7 +90,7 @@ def flags_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarr
     steady = (np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)
     return {f"a frustum is compressed by more than {full:.3g} mm, {FULL_POCKET:.0%} of its height, when its pocket is full":
                 compression_mm >= full,
-            f"surfaces in contact overlap, or gape under pressure, by more than {1e3 * overlap:.3g} um":
+            f"surfaces in contact overlap, or gape under pressure, by more than {plain(overlap)} mm":
                 ~(contact_error_mm < overlap),
             f"fewer than {_FEWEST_POINTS} points of the cover carry the object, which is finer than the mesh":
                 points < _FEWEST_POINTS,
