@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     options.given = list(sys.argv[1:] if arguments is None else arguments)
     with warnings.catch_warnings():
-        warnings.showwarning = partial(_show_warning, options.command, set())   
+        warnings.showwarning = partial(_show_warning, options.command, set())
         return run_to_status(f"softtact {options.command}", lambda: options.run(options))
 
 

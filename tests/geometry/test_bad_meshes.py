@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 from support.mesh_files import U_SHAPE, prism
 from support.sensors import CORO
 
@@ -315,5 +316,5 @@ def test_a_scan_with_a_few_folds_is_smoothed_there_and_it_is_said(tmp_path):
     mended = read_mended(tmp_path / "scan.ply", unit="mm")
     (said,) = mended.repairs
     assert "of small facets, as noise of a scan makes them" in said
-    moved = np.linalg.norm(mended.mesh.vertices - scan(0.1).vertices, axis=1)
-    assert 0 < (moved > 1e-5).mean() < 0.05 and moved.max() < 0.5     # others keep their places, as PLY stores them
+    moved, _ = cKDTree(scan(0.1).vertices).query(mended.mesh.vertices)
+    assert 0 < (moved > 1e-5).mean() < 0.01 and moved.max() < 0.5     # others keep their places, as PLY stores them

@@ -2,8 +2,9 @@
 
 Repaired: facets without finite corners or without area, repeated facets, corners that differ by round-off or lie on an edge of a
 facet without them (T-junctions), holes that are flat or small, facets oriented against their neighbours, bodies inside out, bodies
-that overlap, a few small facets of a scan that its noise laid on their neighbours. Not repaired: large curved holes, edges where
-more than two walls meet, other facets that lie on their neighbours, double-sided bodies, flat or empty meshes, sizes that no body on a sensor has.
+that overlap, a few small facets that the noise of a scan laid on their neighbours. Not repaired: large curved holes, edges where
+more than two walls meet, other facets that lie on their neighbours, double-sided bodies, flat or empty meshes, sizes that no body
+on a sensor has.
 `meshes.read_mesh` then checks the result as it checks any mesh.
 """
 
@@ -117,8 +118,8 @@ def _smooth_folds(mesh, repairs):
         return mesh
     if first:
         moved = np.linalg.norm(smooth.vertices - mesh.vertices, axis=1)
-        repairs.append(f"smoothed {_number(first, 'fold')} of small facets, as noise of a scan makes them: {_count(moved > 0, 'corner')}"
-                       f" moved by up to {moved.max():.2g} mm")
+        repairs.append(f"smoothed {_number(first, 'fold')} of small facets, as noise of a scan makes them: "
+                       f"{_count(moved > 0, 'corner')} moved by up to {moved.max():.2g} mm")
     return smooth
 
 
