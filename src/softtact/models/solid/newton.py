@@ -12,6 +12,7 @@ from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.items import with_pressures
 
 _SMALL = 1 / 16  # share of a step
+_CARRIED = 1e-3  # share of a frame's load below which nothing carries it
 _REMEMBERED = 4  # residuals that a step with friction may not exceed (Grippo, Lampariello and Lucidi, 1986)
 
 
@@ -64,6 +65,7 @@ class _Balance:
     share: float = 1.0
     taken: int = 0
     just_predicted: bool = False
+    floating: bool = False
 
     def prepared(self, state: SolidState, iteration: int) -> SolidState:
         return state
@@ -83,6 +85,7 @@ class _Balance:
     def step(self, state: SolidState) -> tuple[SolidState, Any]:
         body, unknown = self.body, self.target.unknown
         residual, off = body.residual(state).copy(), self._loads_off(state)
+        self.floating = self._is_floating(off)
         frame_steps = [np.zeros(6) for _ in body.frames]
         histories = state.item_histories
         if self.pending:
@@ -101,11 +104,19 @@ class _Balance:
             unsymmetric = body.frictional
             changes = self._loads_along(state, found) if unsymmetric else np.column_stack(columns).T @ found
             schur = corner - changes[:, 1:]
-            amount = np.linalg.solve(schur if unsymmetric else _definite(0.5 * (schur + schur.T)), -off + changes[:, 0])
+            right = changes[:, 0] - off
+            amount = _solved(schur, right) if unsymmetric else np.linalg.solve(_definite(schur), right)
             step = step - found[:, 1:] @ amount
             for (frame, freedom), value in zip(unknown, amount, strict=True):
                 frame_steps[frame][freedom] += value
         return state, (step, frame_steps, histories)
+
+    def _is_floating(self, off: np.ndarray) -> bool:
+        """Whether nothing stands against the loads of a frame, which are all that is out of balance by `off` (unknown,)."""
+        wanted = np.array([self.target.loads[frame][freedom] for frame, freedom in self.target.unknown])
+        frames = np.array([frame for frame, _ in self.target.unknown])
+        return any(np.abs(off + wanted)[frames == frame].max() < _CARRIED * np.abs(wanted[frames == frame]).max()
+                   for frame in set(frames.tolist()))
 
     def _loads_along(self, state: SolidState, steps: np.ndarray) -> np.ndarray:
         """Derivatives (unknown, k) of the loaded freedoms' loads along steps (unknowns, k) of the free displacements."""
@@ -180,8 +191,17 @@ class _Balance:
         return False
 
 
+def _solved(schur: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Steps of the loaded freedoms; of a frame that touches nothing, which nothing resists, along its load."""
+    try:
+        return np.asarray(np.linalg.solve(schur, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.solve(_definite(schur), right))
+
+
 def _definite(schur: np.ndarray) -> np.ndarray:
-    """A symmetric matrix with its eigenvalues' magnitudes, none next to zero: a step uphill would lead away."""
+    """A matrix' symmetric part with its eigenvalues' magnitudes, none next to zero: a step uphill would lead away."""
+    schur = 0.5 * (schur + schur.T)
     values, vectors = np.linalg.eigh(schur)
     least = 1e-8 * max(np.abs(values).max(), 1e-12)
     return (vectors * np.maximum(np.abs(values), least)) @ vectors.T
@@ -229,6 +249,10 @@ class _UnbalancedError(ConvergenceError):
         self.iterations = iterations
 
 
+class LostContactError(_UnbalancedError):
+    """Newton's method did not end, and at its last step nothing stood against the load of a frame."""
+
+
 def _settled(body, state, target, settings, pending, iterations):
     """Newton's method from a state, and augmentations until the contacts are settled; `iterations` were taken before."""
     for _ in range(settings.max_augmentations + 1):
@@ -238,9 +262,8 @@ def _settled(body, state, target, settings, pending, iterations):
         if found.state is None and problem.pending:
             raise _UnbalancedError("The prescribed step turns an element inside out.", iterations)
         if found.state is None:
-            raise _UnbalancedError(
-                f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations.", iterations
-            )
+            words = f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations."
+            raise (LostContactError if problem.floating else _UnbalancedError)(words, iterations)
         state, pending = found.state, False
         if all(item.settled(*both, settings.penetration_mm) for item, *both in body.item_states(state)):
             return state, iterations, found.residual_n

@@ -11,7 +11,7 @@ from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.materials.laws.stretches import stretch_range
 from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.frames import step_vector
-from softtact.models.solid.newton import SolidSettings, Target, balance
+from softtact.models.solid.newton import LostContactError, SolidSettings, Target, balance
 
 _OVERLAP_MM = 1e-3  # overlap of a loaded object with the surface before its load acts, so that contact resists it
 _FAST = 8  # iterations of an increment up to which the next one may be larger
@@ -110,9 +110,10 @@ class SolidPath:
             except TimeLimitError:
                 raise
             except ConvergenceError as error:
-                raise ConvergenceError(
-                    f"Step {number + 1} of {self.steps} was not reached: {error} Use smaller steps or a finer mesh where it folds."
-                ) from None
+                remedy = "" if isinstance(error, _SlidOffError) else " Use smaller steps or a finer mesh where it folds."
+                if remedy and any(step.loads for step in steps.values()):
+                    remedy += " Where a loaded object slides off an edge, prescribe its depth (z) in place of its load."
+                raise ConvergenceError(f"Step {number + 1} of {self.steps} was not reached: {error}{remedy}") from None
             work, dissipated = work + done, dissipated + lost
             yield self._described(state, counts, residual, work, dissipated, time.perf_counter() - began, number)
 
@@ -120,7 +121,7 @@ class SolidPath:
         """A step in as many increments as it takes: state, (iterations, increments), residual, work and dissipation in mJ."""
         body, share, size, counts, work, lost = self.body, 0.0, 1.0, [0, 0], 0.0, 0.0
         name, seconds, held = f"step {number + 1} of {self.steps}", self._duration(number), self._held_before(number)
-        first = body.frame_loads(state), state.pressures
+        first, lost_contact = (body.frame_loads(state), state.pressures), False
         while share < 1 - 1e-9:
             longest = self._longest(seconds, share * seconds + held)
             size = min(size, 1 - share, longest)
@@ -133,7 +134,10 @@ class SolidPath:
                 raise
             except ConvergenceError as error:
                 size *= 0.5
+                lost_contact = lost_contact or isinstance(error, LostContactError)
                 self.tell(f"increment divided: {error}")
+                if size < self.settings.smallest_increment * longest and lost_contact:
+                    raise self._slid_off(steps, share) from None
                 if size < self.settings.smallest_increment * longest:
                     raise
                 continue
@@ -144,6 +148,11 @@ class SolidPath:
             if iterations <= _FAST:
                 size *= 2
         return state, counts, residual, work, lost
+
+    def _slid_off(self, steps, share):
+        loads = "; ".join(f"f{name} {load:g} N" for step in steps.values() for name, load in step.loads.items())
+        return _SlidOffError(f"at {100 * share:.3g} % of it the object leaves the surface, and nothing stands against its load of "
+                             f"{loads}. End the motion before, or prescribe its depth (z) in place of its load.")
 
     def _duration(self, number):
         """How long a step takes in s; infinite without durations."""
@@ -255,6 +264,10 @@ class SolidPath:
             seconds,
             np.nan if self._times is None else float(self._times[number]),
         )
+
+
+class _SlidOffError(ConvergenceError):
+    """A loaded frame left what it pressed on."""
 
 
 def _still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
