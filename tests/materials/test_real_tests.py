@@ -48,8 +48,8 @@ def held(x, y, *, rows=20, ramp=0, jitter=0.0, share=0.0):
     """A test with holds at the stretches x, whose stress falls from 1.3 y to y, with rows of a ramp before each."""
     rng, found, before = np.random.default_rng(2), [], (1.0, 0.0)
     for at, relaxed in zip(x, y, strict=True):
-        up = np.linspace(0, 1, ramp + 1, endpoint=False)[1:]
-        found += [(before[0] + k * (at - before[0]), before[1] + k * (1.3 * relaxed - before[1])) for k in up]
+        up = np.linspace(0, 1, ramp, endpoint=False)    # its first row still has the stretch of the hold before
+        found += [(before[0] + k * (at - before[0]), 1.05 * before[1] + k * (1.3 * relaxed - 1.05 * before[1])) for k in up]
         found += [(at, relaxed * (1 + 0.3 * np.exp(-4 * k / (rows - 1)))) for k in range(rows)]
         before = (at, found[-1][1])
     stretch, stress = np.array(found).T

@@ -38,6 +38,7 @@ _COMMON_MPA = 10.0              # in percent, a silicone's curve, which is strai
 _MUCH_BETTER = 0.2
 _FAR = 4.0                      # stretch beyond which no rubber's curve is as straight as over a few percent
 _NEAR_ZERO = 0.005              # largest strain of a row that counts as unstrained
+_FEWEST = 5                     # rows of which the form of a curve tells one test from another
 _START = 0.2                    # strain up to which a curve is proportional to the neo-Hookean law's
 _PRELOAD = (0.05, 0.3)          # of the stress at `_START`: with an unstrained row, and with an extrapolated line
 _SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of these against that over the last two
@@ -244,17 +245,17 @@ def _shear_as_tension(stretch, stress, as_percent):
     gamma = stretch - 1
     line, percent = (_misfit(unit, stress) for unit in (gamma, _neo_hooke("planar", 1 + gamma / 100)))
     largest, tension = np.abs(gamma).max(), _misfit(_neo_hooke("planar", stretch), stress)
-    possible = _START <= largest <= LARGEST_SHEAR and _as_stiff_as_rubber(SIMPLE_SHEAR, gamma, stress)
+    possible = len(gamma) >= _FEWEST and _START <= largest <= LARGEST_SHEAR and _as_stiff_as_rubber(SIMPLE_SHEAR, gamma, stress)
     if not possible or line >= _MUCH_BETTER * tension or as_percent and percent < _MUCH_BETTER * line:
         return None
-    either = as_percent and line > _MUCH_BETTER * percent
+    either = bool(as_percent and line > _MUCH_BETTER * percent)
     return (f"the stress is a straight line in strain up to {largest:.3g}, as in simple shear, which is another test; if it is "
             f"one, give it as {SIMPLE_SHEAR}{'; if the column holds percent, name it engineering_strain_percent' * either}")
 
 
 def _tension_as_shear(gamma, stress):
     """Remark on a curve of simple shear that bends as planar tension does."""
-    if gamma.min() < -0.3 or np.abs(gamma).max() < 0.5:
+    if len(gamma) < _FEWEST or gamma.min() < -0.3 or np.abs(gamma).max() < 0.5:
         return None
     if _misfit(_neo_hooke("planar", 1 + gamma), stress) < _MUCH_BETTER * _misfit(gamma, stress):
         return "it bends as a curve of planar tension does; if it is one, give it as planar"

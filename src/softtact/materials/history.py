@@ -74,8 +74,11 @@ def find_holds(x: np.ndarray, y: np.ndarray) -> list[Hold]:
         if end - start < _HELD_ROWS or _progress(x[start:end]) >= extent / (len(x) - 1):
             start += 1
             continue
-        if (fall := _relaxation(stress[start:end], least=_FALLS[1] * stress.max(), noise=noise * stress[start:end].max())) > 0:
-            found.append(Hold(start, end, fall))
+        last = end      # without first rows of the next ramp
+        while last - start > _HELD_ROWS and stress[last - 1] > (1 + _FALLS[0] + 4 * noise) * stress[last - 2]:
+            last -= 1
+        if (fall := _relaxation(stress[start:last], least=_FALLS[1] * stress.max(), noise=noise * stress[start:last].max())) > 0:
+            found.append(Hold(start, last, fall))
         start = end
     return found
 
@@ -94,7 +97,7 @@ def _relaxation(stress: np.ndarray, *, least: float, noise: float) -> float:
     half = len(stress) // 2
     first, last = stress[:half].mean(), stress[-half:].mean()
     least = max(_FALLS[0] * first, least, (1 if (np.diff(stress) <= 0).all() else 4) * noise)
-    fall = 1 - stress[-1] / stress.max() if first - last > least else 0.0
+    fall = 1 - np.median(stress[-max(half // 2, 1):]) / stress.max() if first - last > least else 0.0
     return float(fall) if fall < _FALLS[2] else 0.0
 
 
