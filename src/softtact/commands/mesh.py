@@ -95,14 +95,14 @@ def _mesh(options):
     result = {"mesh": str(options.out)} | result | {"regions": mesh.regions, "faces": {name: sum(map(len, facets.values()))
                                                                                       for name, facets in mesh.faces.items()}}
     shown = {name.replace("_", " "): short(value) for name, value in result.items()
-             if name not in ("mesh", "remarks") and value not in ([], {})}
+             if name not in ("mesh", "remarks") and value not in ([], {}, None)}
     lines = [f"{name}: {value}" for name, value in shown.items()]
     show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])
 
 
 def _filled(options, rules):
     """The mesh of a surface, and the values to report."""
-    from softtact.fem.body_mesh import MOST_ELEMENTS, body_report, mesh_body
+    from softtact.fem.body_mesh import MOST_ELEMENTS, meshed_body
     from softtact.fem.mesh_files import face_rule, with_named_faces
     from softtact.geometry.tetrahedra import estimated_elements
 
@@ -121,11 +121,11 @@ def _filled(options, rules):
         print(f"softtact mesh: about {count:,} elements and {int(_UNKNOWNS * count):,} unknowns (right to a factor of two); "
               f"meshing takes about {low:.2g} to {high:.2g} s", file=sys.stderr, flush=True)
     began = time.perf_counter()
-    mesh = mesh_body(surface, size_mm=options.size, region=(options.region or ["body"])[0], envelope_mm=options.envelope,
-                     most_elements=MOST_ELEMENTS if options.most_elements is None else options.most_elements)
+    mesh, report = meshed_body(surface, size_mm=options.size, region=(options.region or ["body"])[0], envelope_mm=options.envelope,
+                               most_elements=MOST_ELEMENTS if options.most_elements is None else options.most_elements)
     seconds = time.perf_counter() - began
-    return with_named_faces(mesh, rules), body_report(mesh, surface).as_dict() | {"meshing_s": seconds, "repairs": repairs,
-                                                                                            "remarks": []}
+    values = report.as_dict() | {"meshing_s": seconds, "repairs": repairs, "remarks": list(report.remarks)}
+    return with_named_faces(mesh, rules), values
 
 
 def _taken(options, rules):

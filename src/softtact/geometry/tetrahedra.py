@@ -19,6 +19,7 @@ from softtact.processes import call_apart
 
 ELEMENTS_PER_CUBE = 13     # in a cube of the element size: measured 10 to 30, least where the size is small against the body
 _CORNER_SHARE = 0.5        # of its quality that a tetrahedron may lose when one of its corners is moved onto the surface
+_ON_SURFACE = 1e-6         # of the diagonal: nearer hits of a ray are its start
 _SHARP = np.radians(30)    # angle between facets from which their edge is an edge of the body
 
 
@@ -133,6 +134,17 @@ class ClosestPoints:
     def __call__(self, places: np.ndarray) -> np.ndarray:
         """Closest points (k, 3) of places (k, 3)."""
         return np.asarray(self._facets.find_closest_cell(np.ascontiguousarray(places), return_closest_point=True)[1])
+
+
+def first_hits(surface: trimesh.Trimesh, starts: np.ndarray, directions: np.ndarray) -> list[float]:
+    """Distances in mm at which rays from points (n, 3) on a surface first meet it again; those that do not meet it are left out."""
+    facets, far = _poly(_programs()[0], surface.vertices, surface.faces), float(np.linalg.norm(surface.extents))
+    found = []
+    for start, direction in zip(starts, directions, strict=True):
+        hits = np.linalg.norm(facets.ray_trace(start, start + far * direction)[0] - start, axis=1)
+        hits = hits[hits > _ON_SURFACE * far]
+        found += [float(hits.min())] if len(hits) else []
+    return found
 
 
 def _poly(pyvista, points, facets):
