@@ -77,12 +77,12 @@ def _fit(options):
     refuse_overwriting(_inputs(options, config, shape, timed), {"--out": options.out, "--plot": options.plot})
     prony = _prony_fit(options, timed)
     card, curves, tests = _elastic(options, config, shape, prony)
-    told = [*(misfit_warnings(card) if curves else ()), *(remark for curve in curves for remark in curve.remarks)]
+    reported = [*(misfit_warnings(card) if curves else ()), *(remark for curve in curves for remark in curve.remarks)]
     for name, found in (("mullins", _mullins_fit(options, card, tests)), ("prony", prony)):
         if found is not None:
             others = [text for text in card.get("warnings", []) if not text.startswith(f"{name}:")]
             card |= {name: found.entry(), "warnings": [*others, *found.warnings]}
-            told += found.warnings
+            reported += found.warnings
     write_card(options.out, card)
     if options.plot:
         from softtact.studies.hybrid.figures.material_plot import plot_material
@@ -90,7 +90,7 @@ def _fit(options):
         plot_material(card, curves, options.plot, cycles=tests, over_time=prony.tests if prony else ())
     lines = _fit_lines(card) if curves else [*_modulus_lines(card), *_inelastic_lines(card), *prony.warnings]
     show(card, as_json=options.json, lines=[*lines, f"written: {options.out}"])
-    for warning in told:
+    for warning in reported:
         print(f"softtact fit: WARNING: {warning}", file=sys.stderr)
 
 

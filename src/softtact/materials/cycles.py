@@ -26,7 +26,7 @@ from softtact.materials.mullins import Mullins
 from softtact.materials.uncertainty import covariance_of
 
 FIRST, STEADY, MULLINS = CYCLES = ("first", "steady", "mullins")
-_ONE_AMPLITUDE = 1.2    # ratio of the greatest energies below which m and beta are not told apart
+_ONE_AMPLITUDE = 1.2    # ratio of the greatest energies below which the data do not part m and beta
 _LARGEST_ERROR = 0.25   # of the softened stress, root mean square: above, the effect does not describe these cycles
 _LARGEST_R = 100.0      # the softening is below 1 % there
 _LOOSE = 0.01           # a constant with a smaller standard error, in MPa or 1, is determined, even if it is zero
