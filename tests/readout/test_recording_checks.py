@@ -96,6 +96,7 @@ def test_what_the_load_cell_reads_at_rest_is_taken_off(zero):
 
 @pytest.mark.parametrize(("change", "check", "sentence"), [
     (lambda b: setattr(b, "log_n", b.log_n + 0.3 * b.log_s), "zero of the load cell", "N before the press and 1."),
+    (lambda b: setattr(b, "log_n", 101.97 * b.log_n), "unit of the forces", "its largest force is 2039 N"),
     (lambda b: setattr(b, "log_n", -b.log_n), "sign of the forces", "its forces are negative, down to -20 N"),
     (lambda b: setattr(b, "log_n", 1.5 - b.log_n), "sign of the forces", "turn their sign"),
     (lambda b: setattr(b, "log_n", np.interp(b.log_s - 0.3, b.log_s, b.log_n)), "delay of the log", "taken 0.3 s earlier"),
@@ -111,6 +112,34 @@ def test_what_would_make_the_gains_wrong_is_refused(change, check, sentence):
     with pytest.raises(InputError) as refused:
         refuse_unsafe(found)
     assert sentence in str(refused.value) or any(sentence in one.sentence for one in found)
+
+
+@pytest.mark.parametrize("drift", [15, -15])
+def test_a_drift_of_all_taxels_is_told_without_forces(drift):
+    bench = ramp()
+    bench.add(drift * bench.time_s)
+    found, = told(bench, "drift", log=False)
+    assert f"at the end all taxels have moved alike, by {np.sign(drift) * 5}" in found.sentence and not found.safe
+
+
+def test_plates_that_stay_on_both_fingers_are_no_drift():
+    bench = ramp()
+    bench.counts[150:] = bench.counts[150:] + 300 * np.random.default_rng(1).normal(1, 0.05, (2, 7, 4)).round(3)
+    assert check_recording(bench.alone()) == []
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us")])
+def test_a_log_in_another_unit_of_time_is_refused(factor, unit):
+    bench = ramp()
+    bench.log_s = factor * bench.log_s
+    with pytest.raises(InputError, match=f"it is some {factor:,.0f} times as long as the recording.*is its time in {unit}"):
+        bench.recording()
+
+
+def test_a_log_of_an_hour_covers_a_recording_of_seconds():
+    bench = ramp()
+    bench.log_s, bench.log_n = np.arange(0, 4000, 0.01), np.interp(np.arange(0, 4000, 0.01), bench.log_s, bench.log_n)
+    assert check_recording(bench.recording()) == []
 
 
 def test_faults_at_once_are_all_told():

@@ -74,7 +74,7 @@ def _view(options):
 def _view_recording(options):
     """Draw a recording as a strip of pictures, a GIF or an MP4."""
     from softtact.readout.bags import FOLDER, write_bag
-    from softtact.readout.checks.finding import left_out
+    from softtact.readout.checks.finding import left_out, zeroed
     from softtact.readout.checks.recording import check_recording
     from softtact.readout.sources import recording_of, with_force_of
     from softtact.reporting.recording_view import save_strip, save_video
@@ -91,7 +91,8 @@ def _view_recording(options):
     for sentence in (*recording.attrs.get("notes", ()), *found):
         print(f"softtact view: {sentence}", file=sys.stderr)
     wrong = left_out(recording, [one for one in checked if one.check == "wrong reading"])
-    shown = recording.assign(counts=recording.counts.where(~wrong)) if wrong.any() else recording
+    shown = zeroed(recording, checked)
+    shown = shown.assign(counts=shown.counts.where(~wrong)) if wrong.any() else shown
     if picture.suffix.lower() in (".mcap", FOLDER):
         write_bag(picture, recording)
     else:

@@ -32,6 +32,7 @@ MOVES = 30.0                        # counts: least change of a pressed finger; 
 NOISY = 1.0                         # counts: noise that is no rounding, so that a taxel, or a frame, does not stand by chance
 _LATE_S = 0.05                      # by which a log of forces may begin late or end early: a few rows of the log
 _GAP, _GAP_S = 6.0, 0.1             # a gap in a log: times the usual distance of its rows, and s
+_SLOWEST_S = 0.5                    # distance of rows from which on a log may be one in ms
 _WRAPS_MS = (2.0**32, 2.0**31, 2.0**24, 2.0**16, 2.0**32 / 1000)     # where counters of ms, the last of us, start anew
 _WRAP_STEPS = 20                    # most usual steps of a time where a counter starts anew
 _STEP_BACK_S = 10.0                 # largest step back of a clock that is set; larger ones are other recordings
@@ -169,13 +170,13 @@ def with_forces_at(recording: "xarray.Dataset", time_s: np.ndarray, force_n: np.
 
 
 def _refuse_other_unit(log, time, at):
-    """Refuse times that have hardly a row within the recording, and would cover just the recording in ms or us."""
-    if len(time) < _ROWS_OF_A_CLOCK or (time <= at[-1]).sum() > max(5, 0.05 * len(time)):
+    """Refuse times whose rows lie too far apart for a press, and that would cover just the recording in ms or us."""
+    if len(time) < _ROWS_OF_A_CLOCK or np.median(np.diff(time)) < _SLOWEST_S:
         return
     for unit, factor in (("ms", 1e3), ("us", 1e6)):
         if 0.5 <= (time[-1] - time[0]) / factor / max(at[-1] - at[0], 1e-9) <= 2:
-            raise InputError(f"{log}: it is some {factor:g} times as long as the recording, {_span(time)} for {_span(at)}; is its "
-                             f"time in {unit}? Give time_s in seconds.")
+            raise InputError(f"{log}: it is some {factor:,.0f} times as long as the recording, {_span(time)} for {_span(at)}; is "
+                             f"its time in {unit}? Give time_s in seconds.")
 
 
 def _span(time):

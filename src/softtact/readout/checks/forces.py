@@ -18,6 +18,7 @@ _REST_S, _FEWEST = 0.1, 5     # least duration and number of readings of a rest
 _ZERO = 0.01                  # of the range: forces and counts that count as zero
 _CELL_DRIFTS = 0.02           # of the range of forces: change of a load cell's zero
 _DRIFTS, _DRIFTS_COUNTS = 0.02, 3.0    # least drift: of the counts of a press, and counts
+_GRIPPER_N = 235.0            # largest force of the maker's gripper 2F-85
 _RECOVERS_S = 60.0            # longest time constant with which creep goes back at rest
 _UNPRESSED = 0.4              # of a taxel's largest counts, in the median taxel: no creep leaves so much
 _LAG_S, _LONGEST_LAG_S = 0.05, 2.0
@@ -93,8 +94,9 @@ def gaps(recording: "xarray.Dataset") -> Iterator[Finding]:
             spoiled[inside] = True
             rows = f"{row_of(recording, inside[0])} to {row_of(recording, inside[-1])}"
             yield Finding("gap in the log", f"{log}: it has no row from {begin:.4g} to {end:.4g} s (its rows are "
-                          f"{recording.attrs['force_spacing_s']:.3g} s apart); readings of {name_of(recording)} in between, rows "
-                          f"{rows}, are left out: give the whole log.", tuple(range(recording.sizes["finger"])), left_out=spoiled)
+                          f"{recording.attrs['force_spacing_s']:.3g} s apart); a calibration leaves out what "
+                          f"{name_of(recording)} has in between, rows {rows}: give the whole log.",
+                          tuple(range(recording.sizes["finger"])), left_out=spoiled)
 
 
 def load_cell_zero(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:
@@ -122,6 +124,15 @@ def _steady(press, at):
     force = press.force_n[at]
     steady = np.ptp(_smooth(force)) <= 2 * _ZERO * np.ptp(press.force_n) + 6 * float(noise(force[:, None])[0])
     return float(np.median(force)) if steady else None
+
+
+def unit(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:
+    """Forces beyond those of the gripper that the sensor is made for."""
+    largest = float(np.abs(recording.force_n.values).max())
+    if largest > _GRIPPER_N:
+        yield Finding("unit of the forces", f"{recording.attrs['force_log']}: its largest force is {largest:.4g} N, and the "
+                      f"gripper of a TSF-85 gives {_GRIPPER_N:g} N; is it in grams or another unit? Give it in newtons.",
+                      tuple(range(recording.sizes["finger"])), safe=False)
 
 
 def sign(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:

@@ -21,6 +21,7 @@ _SPREAD = 0.1                         # of a taxel's jump that its neighbours sh
 _TOGETHER = 0.25                      # share of a finger's taxels above which they jump as a frame
 _BEYOND = 10_000.0                    # counts: a jump of many taxels that no press makes
 _HANGS = 10                           # fewest frames of a taxel that hangs
+_DRIFTS_COUNTS, _ALIKE = 20.0, 0.03   # drift without forces: least counts, and scatter over all taxels, less than that of gains
 _CHANCE = 1e-9                        # probability below which a run of equal values is no chance
 
 
@@ -119,8 +120,8 @@ def frozen_frames(recording: "xarray.Dataset") -> Iterator[Finding]:
             begin, end = recording.force_n.values[[first, last], fingers[0]]
             reason = f"while the force goes from {begin:.3g} to {end:.3g} N"
         yield Finding("frozen", f"{where(recording, first, last)}: {len(rows)} readings, from {time[first]:.2f} to "
-                      f"{time[last]:.2f} s, are equal in all taxels of {whom}, {reason}; all but the first are left out: {CABLE} "
-                      "and the program that records.", tuple(fingers),
+                      f"{time[last]:.2f} s, are equal in all taxels of {whom}, {reason}; a calibration uses the first only: "
+                      f"{CABLE} and the program that records.", tuple(fingers),
                       left_out=np.any([readings(recording, finger, rows[1:]) for finger in fingers], axis=0))
 
 
@@ -143,6 +144,20 @@ def _still(recording, finger):
             yield int(first), int(last)
 
 
+def common_drift(recording: "xarray.Dataset") -> Iterator[Finding]:
+    """Counts that have moved in all taxels alike, as by no press, from the beginning to the end. Needs no forces."""
+    counts = recording.counts.values.reshape(len(recording.time), -1).astype(float)
+    some = max(_HANGS, len(counts) // 50)
+    if len(counts) < 4 * some:
+        return
+    moved = np.median(counts[-some:], axis=0) - np.median(counts[:some], axis=0)
+    mean, scatter = float(np.mean(moved)), float(np.median(noise(counts)))
+    if abs(mean) > max(_DRIFTS_COUNTS, scatter) and np.std(moved) < _ALIKE * abs(mean) + 2 * scatter / np.sqrt(some):
+        yield Finding("drift", f"{where(recording, len(counts) - some, len(counts) - 1)}: at the end all taxels have moved alike, "
+                      f"by {mean:.0f} counts from the beginning; let the sensor warm up, take its baseline anew, and record again.",
+                      tuple(range(recording.sizes["finger"])), safe=False)
+
+
 def hanging_taxels(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:
     """Taxels that read one value for longer than chance allows, besides readings that are `spoiled` (time, finger, row, column)."""
     counts = recording.counts.values.reshape(len(recording.time), -1).astype(float)
@@ -158,7 +173,8 @@ def hanging_taxels(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator
         first, end = run
         until = "to the end" if end == len(counts) else f"to row {row_of(recording, end - 1)}"
         yield Finding("hanging", f"{where(recording, first)}: {taxel(finger, in_finger)} reads {counts[first, number]:g} counts "
-                      f"from there {until} while others change; these {end - first} readings are left out: check the taxel.",
+                      f"from there {until} while others change; a calibration leaves these {end - first} readings out: check the "
+                      "taxel.",
                       (finger,), left_out=readings(recording, finger, np.arange(first, end), in_finger))
 
 

@@ -27,7 +27,7 @@ def check_recording(recording: "xarray.Dataset", *, largest: float | None = None
     found += frames.dead_taxels(recording)
     found += frames.frozen_frames(recording)
     found += frames.hanging_taxels(recording, left_out(recording, found))
-    return found + _of_forces(recording, found) if "force_n" in recording else found
+    return found + (_of_forces(recording, found) if "force_n" in recording else list(frames.common_drift(recording)))
 
 
 def _of_forces(recording, of_counts):
@@ -36,7 +36,7 @@ def _of_forces(recording, of_counts):
     spoiled = left_out(recording, [*of_counts, *found])
     found += forces.load_cell_zero(recording, spoiled)
     recording = zeroed(recording, found)
-    for check in (forces.sign, forces.delay, forces.drift):
+    for check in (forces.unit, forces.sign, forces.delay, forces.drift):
         if all(one.safe for one in found):
             found += check(recording, spoiled)
     return found
