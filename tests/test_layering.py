@@ -12,7 +12,7 @@ MOST_LINES = 500
 # other.
 ORDER = (
     ("errors",),
-    ("unknown_names", "progress", "devices", "processes"),
+    ("unknown_names", "progress", "devices", "processes", "words"),
     ("checksums", "inputs", "kernel_files"),
     ("outputs", "compiled"),
     ("files", "drawing", "exits"),

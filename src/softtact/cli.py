@@ -17,6 +17,7 @@ from softtact.commands import (
     calibrate,
     calibrate_camera,
     completion,
+    config_example,
     cost,
     dataset,
     detect_discs,
@@ -36,7 +37,7 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.exits import run_to_status
 
 COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, calibrate_camera, predict, fit, mesh, export_deck,
-            detect_discs, cost, stage, completion)
+            detect_discs, cost, stage, config_example, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
   softtact grasp part.stl --unit mm --force 20 --out results/grasp   # a robot grasps it: both sensors

@@ -14,6 +14,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.materials.curves import AnyCurve, VolumetricCurve
+from softtact.materials.laws.base import Law
 
 # A test whose stiffness p/(1-J) differs from a constant K by more than this is reported: U has no second constant.
 _CURVED = 0.05
@@ -38,6 +39,12 @@ class LinearConstants:
         if set(parameters) != {"young_mpa", "poisson"}:
             raise InputError(f"Linear constants are young_mpa and poisson, not {', '.join(map(str, parameters)) or 'none'}.")
         return cls(**parameters)
+
+    @classmethod
+    def of_law(cls, law: Law) -> Self:
+        """Those of a law at small strain."""
+        K, mu = law.bulk_modulus, law.mu0
+        return cls(9 * K * mu / (3 * K + mu), (3 * K - 2 * mu) / (6 * K + 2 * mu))
 
     @property
     def mu_mpa(self) -> float:

@@ -4,7 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import trimesh
 
+from softtact.contact.height_field import HeightField
 from softtact.files import atomic_path
 
 if TYPE_CHECKING:
@@ -17,6 +19,7 @@ _LIGHT = 0.6             # share of the colour range from which on a number is w
 _HEIGHT = 2.6            # inches of a row that is no map
 _WIDTH = 2.0             # inches of a panel, about
 _LONGEST = 0.12          # of the image's width: longest arrow of a marker's motion
+_OUTLINE = 300           # points along each side of the map from which an object's outline is drawn
 _TIMES = (1, 2, 5, 10)   # that arrows are drawn longer, at most
 
 
@@ -82,13 +85,29 @@ def _half_sides(result):
 def _draw_map(result, axis, step):
     axis.set_xlabel("x (mm)")
     deepest = float(result.deformation_map_mm.max()) or 1.0
+    _outline(result, axis, step)
     return axis.imshow(result.deformation_map_mm[step], origin="lower", extent=_half_sides(result)[1], vmin=0, vmax=deepest,
                        cmap="viridis")
+
+
+def _outline(result, axis, step):
+    """The outline of a rigid object from above, dashed, and of its part below the surface at rest, in the frame of the map."""
+    placed = result.placed_object
+    if placed is None:
+        return
+    at = placed.points_mm + placed.displacement_mm[step]
+    (x0, x1, y0, y1), surface = _half_sides(result)[1], HeightField(trimesh.Trimesh(at, placed.triangles, process=False))
+    x, y = (np.linspace(low, high, _OUTLINE) for low, high in ((x0, x1), (y0, y1)))
+    low = surface.on_grid(x, y)
+    axis.contour(x, y, np.isfinite(low), [0.5], colors="white", linewidths=0.8, linestyles="dashed")
+    if np.nanmin(low, initial=np.inf) < 0:
+        axis.contour(x, y, np.where(np.isfinite(low), low, np.nanmax(low)), [0.0], colors="white", linewidths=0.8)
 
 
 def _draw_taxels(result, axis, step, highest):
     half, extent = _half_sides(result)
     axis.set_xlabel("x (mm)")
+    _outline(result, axis, step)
     image = axis.imshow(result.tactile_map[step], origin="lower", extent=extent, vmin=0, vmax=highest, cmap="viridis")
     _write_counts(axis, result.tactile_map[step], half, highest)
     return image

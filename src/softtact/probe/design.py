@@ -293,7 +293,7 @@ def _refuse_materials(design, where):
             law = material.make()
         except InputError as error:     # the constants' checks do not know the file
             raise InputError(f"{where}: {name}: {error}") from None
-        young[name] = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)
+        young[name] = LinearConstants.of_law(law).young_mpa
     least = min(("supports", "beam"), key=young.__getitem__)
     for name, value in young.items():
         stiff = name in ("supports", "beam")

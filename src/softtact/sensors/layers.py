@@ -1,12 +1,16 @@
 """Sensors of `kind: layers`: one or two plain layers without frusta, on the board or held only at their sides."""
 
-from typing import Annotated, Any, Literal, NoReturn
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn, Self
 
 from pydantic import Field
 
 from softtact.errors import InputError
+from softtact.materials.config import law_from_printed
+from softtact.materials.linear import LinearConstants
 from softtact.sensors.base import BaseSpec
-from softtact.sensors.fields import Coefficient, FiniteSection, Length
+from softtact.sensors.fields import Coefficient, ElasticLayer, FiniteSection, Length
+from softtact.sensors.library import material_file
 
 _ELEMENTS = 4     # through the thickness, for the default size of elements in plan
 
@@ -36,8 +40,21 @@ class LayersSpec(BaseSpec):
     kind: Literal["layers"]
     support: Literal["base", "none"]
     layers: Annotated[tuple[PlainLayer, ...], Field(min_length=1, max_length=2)]
+    elastic_layer: ElasticLayer = Field(None, description="by default of the law of a single layer")     # type: ignore[assignment]
     element_mm: Length | None = None
     friction: ObjectFriction = ObjectFriction()
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Self:
+        """As of every kind; the linear layer of a single layer follows from its law, where the file states none."""
+        spec = super().from_dict(values, where=where, folder=folder)
+        if "elastic_layer" in spec.model_fields_set:
+            return spec
+        if spec.cover is not None:
+            raise InputError(f"{where}, at 'elastic_layer': it is missing, and two layers have no single law from which it could "
+                             "follow; give its young_mpa and poisson.")
+        linear = LinearConstants.of_law(law_from_printed(material_file(spec.dielectric.material), "mooney_rivlin"))
+        return spec.model_copy(update={"elastic_layer": ElasticLayer(young_mpa=linear.young_mpa, poisson=linear.poisson)})
 
     @property
     def dielectric(self) -> PlainLayer:

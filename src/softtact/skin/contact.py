@@ -20,6 +20,7 @@ from softtact.errors import ExtrapolationWarning, InputError
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
+from softtact.materials.linear import LinearConstants
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.progress import Watch, announce
@@ -161,7 +162,7 @@ def press_at_finite_strains(skin: Skin, mesh: trimesh.Trimesh, centre_mm: tuple[
                      rigid={_OBJECT: (placed.bounds.mean(axis=0), np.asarray(placed.triangles))})  # fmt: skip
     face = Surface.of(layer.face("top"))
     size = face.size_mm(body.points)
-    young = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)
+    young = LinearConstants.of_law(law).young_mpa
     body.add(
         ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * young / size,
                     reach_mm=2 * size, friction=friction, rigid=True)
