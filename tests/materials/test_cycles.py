@@ -123,6 +123,14 @@ def test_a_file_of_cycles_is_refused_with_the_options_that_read_it(write_file):
         read_curve(written(write_file, softening_test(cycles_to(1.5, 2.0))))
 
 
+def test_the_turn_from_unloading_to_loading_is_no_hold(write_file):
+    """Where the stress falls and rises again within a few rows of nearly the same stretch."""
+    back = 1.26 + 0.24 * np.cos(np.linspace(0, 2 * np.pi, 60))
+    stretch = np.concatenate([np.linspace(1, 1.5, 40), back, np.linspace(1.5, 2.5, 40)])
+    with pytest.raises(InputError, match="turns back at 1.5 over the range before"):
+        read_curve(written(write_file, softening_test(stretch)))
+
+
 @pytest.mark.parametrize(("stretch", "options", "sentence"), [
     (np.linspace(1, 2, 20), {"cycles": "first"}, "uniaxial.csv: the strain only grows, so --cycles has no effect"),
     (cycles_to(2.0), {"cycles": "steady"}, "uniaxial.csv: it is loaded once, so there is no steady cycle; take --cycles first"),
