@@ -138,6 +138,8 @@ REFUSED = [
     ("pin.step", STEP, "inch", r"the unit is given as inch, and that of the file is mm; leave the unit out"),
     ("cut.step", STEP[:2000], None, "it ends without END-ISO-10303-21, so it was cut off"),
     ("text.step", b"solid", None, "it does not begin with ISO-10303-21"),
+    ("crash.step", STEP.replace(b"#140=EDGE_CURVE(", b"#140=EDGE_CURVE%(").replace(b"VECTOR('',", b"VECTOR(,"), None,
+     "Open CASCADE crashed as it read the file, which is damaged or too large; export it again"),
     ("empty.step", STEP.replace(b"MANIFOLD_SOLID_BREP", b"NO_BREP"), None, "Open CASCADE finds no body in it|holds no triangles"),
     ("inch.3mf", file_3mf(mesh_3mf(scale=0.1), ONE, 'unit="inch"'), "mm",
      "given as mm, and that of the file is inch"),

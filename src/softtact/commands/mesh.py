@@ -18,6 +18,7 @@ from softtact.commands.common import (
     pairs,
     pose_of,
     read_object,
+    report_reading,
     sensor_spec,
     short,
     show,
@@ -70,7 +71,9 @@ def _add_complexity(commands):
 
 def _complexity(options):
     from softtact.geometry.complexity import choose_model, score_file
+    from softtact.geometry.formats import read_facets
 
+    report_reading(options, options.mesh, read_facets(options.mesh).notes)
     spec = sensor_spec(options.sensor)
     counts = score_file(options.mesh, unit=options.unit, footprint_mm=spec.footprint_mm, pose=pose_of(options),
                         reach_mm=spec.thickness_mm)

@@ -1,6 +1,7 @@
 """GLB files, scenes of glTF in metres, and STEP files, curved bodies of CAD, as facets; Open CASCADE (`cascadio`) reads STEP."""
 
 import contextlib
+import faulthandler
 import io
 import json
 import os
@@ -11,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from softtact.errors import InputError
+from softtact.errors import InputError, WorkerError
 from softtact.inputs import in_one_sentence
+from softtact.processes import call_apart
 
 CHORD_MM = 0.01
 """Largest distance in mm of a STEP file's surface from its facets; the mean over a ball is a fifth of it."""
@@ -57,17 +59,28 @@ def _refuse_extensions(path, data):
 
 def read_step(path: Path, data: bytes) -> tuple[np.ndarray, list[str]]:
     """Triangles (n, 3, 3) in mm of a STEP file's bodies, and the names of its units of length, which Open CASCADE converts."""
-    import cascadio  # of an extra: where it is missing, the command says which
+    import cascadio  # noqa: F401     of an extra: where it is missing, the command says which
 
     if not data.lstrip().startswith(b"ISO-10303-21"):
         raise InputError(f"{path}: it does not begin with ISO-10303-21 as a STEP file does; {_AGAIN}.")
     if b"END-ISO-10303-21" not in data[-1000:]:
         raise InputError(f"{path}: it ends without END-ISO-10303-21, so it was cut off; {_AGAIN}.")
-    with _quiet():
-        glb = cascadio.load(data, tol_linear=_INSIDE * CHORD_MM, tol_angular=_ANGLE)
+    try:
+        glb = call_apart(_tessellated, data)     # damaged files crash it
+    except WorkerError:
+        raise InputError(f"{path}: Open CASCADE crashed as it read the file, which is damaged or too large; {_AGAIN}.") from None
     if not glb:
         raise InputError(f"{path}: Open CASCADE finds no body in it; {_AGAIN} as a solid body, in AP203, AP214 or AP242.")
     return read_glb(path, glb) * _TO_MM, _lengths(data)
+
+
+def _tessellated(data):
+    """GLB of the bytes of a STEP file; empty where Open CASCADE finds nothing in it."""
+    import cascadio
+
+    faulthandler.disable()     # a crash is one sentence of the caller
+    with _quiet():
+        return cascadio.load(data, tol_linear=_INSIDE * CHORD_MM, tol_angular=_ANGLE)
 
 
 def _lengths(data):

@@ -60,7 +60,7 @@ def _step(path: Path, data: bytes) -> Facets:
     triangles, units = read_step(path, data)
     facets = f"its curved faces are facets within {CHORD_MM:g} mm"
     if not units:     # Open CASCADE then takes the numbers for mm
-        return Facets(triangles, notes=(facets,))
+        return Facets(triangles, notes=(f"{facets[:-2]}of the given unit",))
     return Facets(triangles, "mm", tuple(units), (f"read in {' and '.join(units)}, as the file states; {facets}",))
 
 
