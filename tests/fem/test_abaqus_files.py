@@ -83,6 +83,8 @@ def test_sets_of_one_name_in_two_parts_are_told_apart_by_the_part(read):
     parts = inp_part("A", *hexahedra(), elset="GEL") + inp_part("B", *hexahedra(1), elset="GEL")
     body = read(parts + inp_assembly({"A-1": ("A", ""), "B-1": ("B", "9, 0, 0\n")}))
     assert sizes(body) == {"A.GEL": 8, "B.GEL": 1}
+    parts = inp_part("A.1", *hexahedra(), elset="GEL") + inp_part("B", *hexahedra(1))
+    assert sizes(read(parts + inp_assembly({"A-1": ("A.1", ""), "B-1": ("B", "9, 0, 0\n")}))) == {"GEL": 8, "EB": 1}
 
 
 def test_sets_may_hold_sets_be_continued_and_leave_out_the_step(read):
@@ -120,6 +122,15 @@ def test_a_surface_on_sides_of_elements_becomes_a_face(read, kind, cells, bottom
     body = read(inp_nodes(NODES) + inp_elements(kind, cells, "GEL") + f"*SURFACE, NAME=PRESSED, TYPE=ELEMENT\n{rows}")
     assert sum(map(len, body.mesh.faces["PRESSED"].values())) == count
     assert set(body.mesh.points[body.mesh.face_nodes("PRESSED")][:, 2]) == {0.0 if lower else 4.0}
+
+
+def test_sides_of_quadratic_tetrahedra_are_numbered_as_in_abaqus(read):
+    nodes, cells = quadratic(NODES, TETRA)
+    corners = {"S1": [0, 1, 2], "S2": [0, 3, 1], "S3": [1, 3, 2], "S4": [2, 3, 0]}
+    rows = "".join(f"{k + 1}, {side}\n" for k, cell in enumerate(cells) for side, of in corners.items()
+                   if (nodes[cell[of]][:, 2] == 4).all())
+    body = read(inp_nodes(nodes) + inp_elements("C3D10", cells, "GEL") + f"*SURFACE, NAME=TOP\n{rows}")
+    assert len(body.mesh.faces["TOP"]["triangle6"]) == 8 and (body.mesh.points[body.mesh.face_nodes("TOP")][:, 2] == 4).all()
 
 
 def test_a_surface_of_a_set_without_sides_is_its_outside(read):

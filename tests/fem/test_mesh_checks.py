@@ -85,6 +85,13 @@ def test_small_elements_that_hang_on_a_large_one_are_told(read):
     assert body.pieces == 1 and "pairs of nodes of one piece lie in one place" in body.remarks[0]
 
 
+def test_elements_that_share_no_node_at_all_are_told(read):
+    nodes, hexes = hexahedra(3)
+    body = read(nodes[hexes].reshape(-1, 3), ("hexahedron", np.arange(27 * 8).reshape(-1, 8)))
+    assert body.pieces == 27 and body.remarks[0] == "the body is in 27 pieces that share no node"
+    assert "pairs of nodes lie in one place and are not joined" in body.remarks[1]
+
+
 def test_collapsed_and_repeated_elements_are_refused(read):
     with pytest.raises(InputError, match="1 elements have a node twice"):
         read(NODES, ("hexahedron", np.vstack([HEXES[1:], [[0, 1, 4, 4, 9, 10, 13, 13]]])))

@@ -15,7 +15,8 @@ from softtact.fem.abaqus_keywords import Block, fields, read_blocks
 _BODY = re.compile(r"(C3D|CPE|CPEG|CPS|CAX|CGAX)(\d+)[RHIMSTPE]*")
 _FACET = re.compile(r"(?:S|M3D|R3D|SFM3D|DS|STRI)(3|4|65?|8|9)(?:[RHTSW]+|5|R5|RT)?")
 _LINE = re.compile(r"(?:T2D|B2|SAX|MAX|SFMAX|RAX|R2D)([123])[HT]*")
-_LEFT_OUT = re.compile(r"(?:T2D|T3D|B\d|PIPE|ELBOW|FRAME|SPRING|DASHPOT|MASS|ROTARYI|CONN|JOINT|GAP|DCOUP|ITS|DRAG|HEATCAP).*")
+_LEFT_OUT = re.compile(r"(?:T2D|T3D|B\d|PIPE|ELBOW|FRAME|SPRING|DASHPOT|MASS|ROTARYI|CONN|JOINT|GAP|DCOUP|ITS|DRAG|HEATCAP|"
+                       r"RB\dD).*")
 _SHAPES = {("solid", 4): "tetra", ("solid", 10): "tetra10", ("solid", 8): "hexahedron", ("solid", 20): "hexahedron20",
            ("solid", 6): "wedge", ("solid", 15): "wedge15", ("solid", 5): "pyramid",
            ("plane", 3): "triangle", ("plane", 6): "triangle6", ("plane", 65): "triangle6", ("plane", 4): "quad",

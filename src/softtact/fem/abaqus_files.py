@@ -178,17 +178,16 @@ class _Assembly:
 
         Where several parts have the same name, that of the part precedes it.
         """
-        owners: dict[str, dict[str, tuple[str, list, bool]]] = {}
+        owners: dict[str, dict[str, tuple[str, str, list, bool]]] = {}
         for key, instance in self.deck.instances.items():
             for scope in instance.scopes:
                 for name, one in getattr(scope, what).items():
-                    new: tuple[str, list, bool] = (f"{scope.name}.{one.name}", [], getattr(one, "internal", False))
-                    owners.setdefault(name, {}).setdefault(scope.name.upper(), new)[1].append((key, name))
+                    new: tuple[str, str, list, bool] = (scope.name, one.name, [], getattr(one, "internal", False))
+                    owners.setdefault(name, {}).setdefault(scope.name.upper(), new)[2].append((key, name))
         found = {}
         for of in owners.values():
-            for full, members, internal in of.values():
-                label = full.partition(".")[2] if len(of) == 1 else full.removeprefix(".")
-                found[label] = (members, internal)
+            for owner, name, members, internal in of.values():
+                found[f"{owner}.{name}" if owner and len(of) > 1 else name] = (members, internal)
         return found
 
     def _default(self, sets, regions, shown) -> list[str]:

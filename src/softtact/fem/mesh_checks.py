@@ -144,11 +144,9 @@ def piece_numbers(mesh: SolidMesh) -> tuple[int, list[np.ndarray]]:
 def remarks_on_pieces(mesh: SolidMesh) -> tuple[int, list[str]]:
     """Number of pieces that share no node, and sentences (without a full stop) on those that touch or overlap, with a place."""
     count, numbers = piece_numbers(mesh)
-    remarks = _unjoined(mesh, numbers)
-    if count == 1:
-        return count, remarks
-    remarks.append(f"the body is in {count} pieces that share no node")
-    if count > _MOST_PIECES:
+    several = [f"the body is in {count} pieces that share no node"] if count > 1 else []
+    remarks = [*several, *_unjoined(mesh, numbers, across=count > _MOST_PIECES)]
+    if count == 1 or count > _MOST_PIECES:
         return count, remarks
     pieces = [_Piece(mesh, [nodes[of == k] for of, (_, _, nodes) in zip(numbers, mesh.cells, strict=True)],
                      list(dict.fromkeys(region for of, (region, _, _) in zip(numbers, mesh.cells, strict=True) if (of == k).any())))
@@ -158,19 +156,23 @@ def remarks_on_pieces(mesh: SolidMesh) -> tuple[int, list[str]]:
     return count, [*remarks, *found[:_MOST_TOLD], *more]
 
 
-def _unjoined(mesh, numbers):
-    """A remark on outer nodes of one piece that lie in one place, as at a crack or where small elements meet large ones."""
+def _unjoined(mesh, numbers, *, across):
+    """A remark on outer nodes that lie in one place, as at a crack or where small elements meet large ones.
+
+    across: of all pieces, in place of nodes of the same piece
+    """
     outer = np.unique(np.concatenate([nodes.ravel() for nodes in mesh.boundary.values()]))
     piece = np.zeros(len(mesh.points), dtype=np.int64)
     for of, (_, _, nodes) in zip(numbers, mesh.cells, strict=True):
         piece[nodes] = of[:, None]
     places = mesh.points[outer]
     pairs = outer[cKDTree(places).query_pairs(_ON * np.ptp(places, axis=0).max(), output_type="ndarray")]
-    pairs = pairs[piece[pairs[:, 0]] == piece[pairs[:, 1]]]
+    pairs = pairs if across else pairs[piece[pairs[:, 0]] == piece[pairs[:, 1]]]
     if not len(pairs):
         return []
-    return [f"{len(pairs)} pairs of nodes of one piece lie in one place and are not joined (one {_at(mesh, pairs[0])}): it is a "
-            "crack, or elements of two sizes meet there"]
+    why = "merge them if the pieces are bonded" if across else "it is a crack, or elements of two sizes meet there"
+    return [f"{len(pairs)} pairs of nodes{'' if across else ' of one piece'} lie in one place and are not joined (one "
+            f"{_at(mesh, pairs[0])}): {why}"]
 
 
 class _Piece:
