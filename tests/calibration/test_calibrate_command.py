@@ -22,6 +22,9 @@ def folder(bench, tmp_path, monkeypatch):
         mesh.export(tmp_path / f"{name}.stl")
         log = np.column_stack([recording.time.values, recording.force_n.values[:, 0]])
         np.savetxt(tmp_path / f"{name}_force.csv", log, delimiter=",", header="time_s,force_n", comments="", fmt="%.6f")
+        if name == "plate":
+            late = np.column_stack([log[:, 0], np.interp(log[:, 0] - 0.3, *log.T)])
+            np.savetxt(tmp_path / "late.csv", late, delimiter=",", header="time_s,force_n", comments="", fmt="%.6f")
     small_sensor_file(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -52,6 +55,7 @@ def test_calibrate_writes_a_sensor_that_presses_and_a_page_with_its_residuals(fo
     (BOTH.replace("--fit none", "--fit gap"), "no unknown 'gap'"),
     (BOTH.replace("--fit none", "--fit cover"), "The elastic model is one layer and knows no cover"),
     (BOTH.replace("--force plate_force.csv --force bar_force.csv", "--force 2000"), "--force 2000: its largest force is 2000 N"),
+    (BOTH.replace("--force plate_force.csv", "--force late.csv"), "late.csv: the counts of finger 0 follow its forces best when"),
     (BOTH + " --place 1,2", "--place 1,2: it is not three numbers"),
     (BOTH + " --finger 1", "plate.csv: finger 1 changes by"),
     (BOTH, "bar.csv: the press explains"),     # the bar did not lie in the middle

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from simulated_recordings import HiddenConstants
 from support.calibration import BALL, BAR, BLOCK, PLATE, Bench, small_sensor_file
+from support.sound_recordings import ramp
 
 import softtact
 from softtact.calibration.checks import Candidate, check_recordings, check_result, rank
@@ -177,6 +178,23 @@ def test_a_recording_without_force_or_without_a_press_is_refused():
     counts[50:] = 200
     with pytest.raises(InputError, match="its force is not known; state the force of a held weight"):
         experiment(make_recording(np.arange(100) / 60, counts, source="x"), BALL)
+
+
+def test_a_reading_that_is_left_out_spoils_its_interval_of_that_taxel_only():
+    recording = ramp().recording()
+    recording.counts[203, 0, 4, 2] = 30000
+    wrong = np.zeros(recording.counts.shape, dtype=bool)
+    wrong[203, 0, 4, 2] = True
+    one = experiment(recording, BALL, left_out=wrong)
+    assert np.argwhere(~one.usable).tolist() == [[50, 4, 2]] and one.noise_counts == pytest.approx(3, rel=0.1)
+
+
+def test_frames_that_rows_repeat_count_once():
+    once, many = ramp(rate=60), ramp(rate=960)
+    many.counts = once.counts.repeat(16, axis=0)
+    ours, theirs = (experiment(bench.recording(), BALL) for bench in (once, many))
+    assert ours.noise_counts == theirs.noise_counts == pytest.approx(3, rel=0.1)
+    assert ours.readings_a_bin == theirs.readings_a_bin and np.array_equal(ours.counts, theirs.counts)
 
 
 def test_dead_and_clipped_taxels_are_left_out():

@@ -21,7 +21,7 @@ _SPREAD = 0.1                         # of a taxel's jump that its neighbours sh
 _TOGETHER = 0.25                      # share of a finger's taxels above which they jump as a frame
 _BEYOND = 10_000.0                    # counts: a jump of many taxels that no press makes
 _HANGS = 10                           # fewest frames of a taxel that hangs
-_DRIFTS_COUNTS, _ALIKE = 20.0, 0.03   # drift without forces: least counts, and scatter over all taxels, less than that of gains
+_DRIFTS_COUNTS, _ALIKE = 20.0, 0.02   # drift without forces: least counts, and scatter over all taxels, less than that of gains
 _CHANCE = 1e-9                        # probability below which a run of equal values is no chance
 
 
@@ -32,7 +32,8 @@ def wrong_readings(recording: "xarray.Dataset") -> Iterator[Finding]:
         runs = Runs.of(counts)
         if len(runs.first) < _FEWEST:
             continue
-        single, whole = _wrong(counts[runs.first], _impossible(recording, finger)[runs.first])
+        brief = runs.length <= 2 * runs.usual      # what stands for longer is a rest or a hold
+        single, whole = _wrong(counts[runs.first], _impossible(recording, finger)[runs.first], brief)
         for number in np.flatnonzero(single.any(axis=0)):
             yield _wrong_taxel(recording, finger, number, runs, np.flatnonzero(single[:, number]))
         if whole.any():
@@ -45,11 +46,12 @@ def _impossible(recording, finger):
     return (raw < 0) | (raw > LARGEST_RAW) if recording.baseline.values.any() else np.zeros(raw.shape, dtype=bool)
 
 
-def _wrong(frames, impossible):
-    """Wrong readings (n, taxel), and wrong frames (n,), of distinct frames (n, taxel)."""
+def _wrong(frames, impossible, brief):
+    """Wrong readings (n, taxel), and wrong frames (n,), of distinct frames (n, taxel), among those that are `brief` (n,)."""
     off, usual = deviations(frames)
     noises = noise(frames)
-    odd = (np.abs(off) > np.maximum(_SPIKE * np.maximum(usual, noises), _SPIKE_COUNTS)) | impossible
+    far = np.abs(off) > np.maximum(_SPIKE * np.maximum(usual, noises), _SPIKE_COUNTS)
+    odd = (far & brief[:, None]) | impossible
     count = odd.sum(axis=1)
     upwards = (odd & (off > 0)).sum(axis=1) / np.maximum(count, 1)
     beyond = np.median(np.abs(off), axis=1) > _BEYOND
@@ -147,15 +149,18 @@ def _still(recording, finger):
 def common_drift(recording: "xarray.Dataset") -> Iterator[Finding]:
     """Counts that have moved in all taxels alike, as by no press, from the beginning to the end. Needs no forces."""
     counts = recording.counts.values.reshape(len(recording.time), -1).astype(float)
-    some = max(_HANGS, len(counts) // 50)
-    if len(counts) < 4 * some:
+    rows = Runs.of(counts).first
+    some = max(_HANGS, len(rows) // 50)
+    if len(rows) < 4 * some:
         return
-    moved = np.median(counts[-some:], axis=0) - np.median(counts[:some], axis=0)
-    mean, scatter = float(np.mean(moved)), float(np.median(noise(counts)))
-    if abs(mean) > max(_DRIFTS_COUNTS, scatter) and np.std(moved) < _ALIKE * abs(mean) + 2 * scatter / np.sqrt(some):
-        yield Finding("drift", f"{where(recording, len(counts) - some, len(counts) - 1)}: at the end all taxels have moved alike, "
-                      f"by {mean:.0f} counts from the beginning; let the sensor warm up, take its baseline anew, and record again.",
-                      tuple(range(recording.sizes["finger"])), safe=False)
+    frames = counts[rows]
+    moved = np.median(frames[-some:], axis=0) - np.median(frames[:some], axis=0)
+    mean, by_noise = abs(float(np.mean(moved))), 1.25 * float(np.median(noise(counts))) * np.sqrt(2 / some)
+    alike = np.var(moved) - by_noise**2 < (_ALIKE * mean) ** 2
+    if mean > _DRIFTS_COUNTS and by_noise < 1.5 * _ALIKE * mean and alike:
+        yield Finding("drift", f"{where(recording, rows[-some], len(counts) - 1)}: at the end all taxels have moved alike, "
+                      f"by {np.mean(moved):.0f} counts from the beginning; let the sensor warm up, take its baseline anew, and "
+                      "record again.", tuple(range(recording.sizes["finger"])), safe=False)
 
 
 def hanging_taxels(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:
