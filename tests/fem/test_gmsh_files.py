@@ -119,6 +119,7 @@ def test_what_cannot_be_read_right_is_refused(tmp_path):
         (msh22(nodes[:20], [(5, 1, 1, hexes)]), r"has the node \d+, which is not in the file"),
         (good.replace(b"\n2 2 0 0\n", b"\n1 2 0 0\n"), "two nodes have the same number"),
         (good.replace(b"\n2 2 0 0\n", b"\n2 nan 0 0\n"), "not a finite number"),
+        (good.replace(b"\n2 2 0 0\n", b"\n2 1e200 0 0\n"), "below 1e\\+06 mm"),
         (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "no nodes"),
     ]:
         (tmp_path / "body.msh").write_bytes(content)

@@ -84,7 +84,7 @@ class _Content:
 
     def _take(self, count, kind):
         width = np.dtype(kind).itemsize if self.binary else 1
-        if not 0 <= count * width <= self._end - self._at:
+        if not 0 <= int(count) * width <= self._end - self._at:
             raise self.refusal("it holds fewer numbers than it states; is it cut off?")
         start, self._at = self._at, self._at + int(count) * width
         if self.binary:

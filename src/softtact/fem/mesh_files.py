@@ -34,6 +34,7 @@ _PACKED = re.compile(rb"<VTKFile[^>]* compressor=[^>]*>")
 _INLINE = re.compile(rb'<DataArray[^>]* format="binary"[^>]*>\s*([\w+/]{16,32})')
 _APPENDED = re.compile(rb'<DataArray[^>]* offset="(\d{1,15})"')
 _TURNED_WEDGE = [3, 4, 5, 0, 1, 2]
+_FARTHEST_MM = 1e6
 _TERM = re.compile(r"\s*([xyz])\s*([<>])\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
 
@@ -176,8 +177,9 @@ def _refuse_strange_nodes(path, raw, elements):
     for k, (_, nodes) in enumerate(raw.blocks):
         if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(raw.points)):
             raise InputError(f"{path}: an element has a node that is not in the file; save it again.")
-        if k in elements and not np.isfinite(raw.points[nodes]).all():
-            raise InputError(f"{path}: a node of an element has a coordinate that is not a finite number; correct it.")
+        if k in elements and not (np.abs(raw.points[nodes]) < _FARTHEST_MM).all():
+            raise InputError(f"{path}: a node of an element has a coordinate that is not a finite number below {_FARTHEST_MM:g} "
+                             "mm; correct it, or the unit.")
 
 
 def _region_names(path, raw, wanted):
