@@ -155,11 +155,11 @@ def _digest(path):
 def _pictures(options, data, scene, record):
     """Draw the pictures; return their paths."""
     from softtact.imaging.movies import write_movie
-    from softtact.robot.render import WHOLE, draw_grasp, draw_rows
+    from softtact.robot.render import CLOSE, WHOLE, draw_grasp, draw_rows
 
     written = []
     if options.picture:
-        images = draw_rows(scene, record, record.event_row)
+        images = [draw_rows(scene, record, record.event_row, view=view) for view in (WHOLE, CLOSE)]
         written.append(options.out / "grasp.png")
         draw_grasp(data, written[-1], images=images)
     if options.video:

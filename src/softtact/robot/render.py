@@ -128,40 +128,43 @@ def _camera(record, row, view):
     return [*view, *(hand + _ABOVE_HAND if near else [0.35, 0.0, 0.35])]
 
 
-def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: np.ndarray | None) -> None:
-    """Write a PNG or SVG with a row for each event: robot, maps and counts of both fingers.
+def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: Sequence[np.ndarray | None]) -> None:
+    """Write a PNG or SVG with a row for each event: the robot, maps of both fingers with their scale, and counts with theirs.
 
-    data: of an `events.nc`;  images: (event, height, width, 3) of the robot, or None without
+    data: of an `events.nc`;  images: views of the robot, each (event, height, width, 3), or None where it could not be drawn
     """
     from matplotlib.figure import Figure
 
-    events, first = data.sizes["event"], 0 if images is None else 1
-    figure = Figure(figsize=(4.2 * first + 7.2, 2.6 * events + 0.6), layout="constrained")
-    grid = figure.subplots(events, 4 + first, squeeze=False, width_ratios=[3.0] * first + [1.0] * 4)
-    deepest = max(float(data.deformation_map_mm.max()), 1e-9)
-    highest = max(float(data.tactile_map.max()), 1.0)
-    extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+    views = [view for view in images if view is not None]
+    events, first = data.sizes["event"], len(views)
+    figure = Figure(figsize=(3.2 * first + 7.6, 2.6 * events + 0.9), layout="constrained")
+    grid = figure.subplots(events, 4 + first, squeeze=False, width_ratios=[2.2] * first + [1.0] * 4)
+    figure.suptitle(f"{Path(str(data.attrs.get('mesh', 'object'))).name} in the gripper, sensor {data.attrs['sensor']}")
     for event in range(events):
-        row = int(data.event_row[event])
-        if images is not None:
-            grid[event, 0].imshow(images[event])
-            grid[event, 0].set_axis_off()
-        head = f"{data.event.values[event]}, {float(data.time_s[row]):.2f} s"
-        grid[event, 0].set_title(head, fontsize=9, loc="left")
-        for finger, name in enumerate(data.finger.values):
-            force = -float(data.force_n[row, finger, 2])
-            maps, counts = grid[event, first + 2 * finger], grid[event, first + 2 * finger + 1]
-            shown = maps.imshow(data.deformation_map_mm[event, finger], origin="lower", extent=extent, vmin=0, vmax=deepest,
-                                cmap="viridis")
-            read = counts.imshow(data.tactile_map[event, finger], origin="lower", extent=extent, vmin=0, vmax=highest,
-                                 cmap="viridis")
-            maps.set_title(f"{name}: {force:.3g} N\n{data.model.values[event, finger]}", fontsize=8)
-            for axes in (maps, counts):
-                axes.set_xlabel("x (mm)", fontsize=7)
-                axes.tick_params(labelsize=7)
-            maps.set_ylabel("y (mm)", fontsize=7)
-    bars = figure.colorbar(shown, ax=grid, label="towards the PCB (mm)", shrink=0.6), \
-        figure.colorbar(read, ax=grid, label="counts, ideal readout", shrink=0.6)
-    for bar in bars:
-        bar.ax.tick_params(labelsize=7)
+        head = f"{data.event.values[event]}, {float(data.time_s[int(data.event_row[event])]):.2f} s"
+        for axis, view in zip(grid[event], views, strict=False):
+            axis.imshow(view[event])
+            axis.set_axis_off()
+        for axis in grid[event, first:]:
+            axis.set_xlabel("x (mm)", fontsize=7)
+            axis.tick_params(labelsize=7)
+        if first:
+            grid[event, 0].set_title(head, fontsize=9, loc="left")
+        grid[event, first].set_ylabel("y (mm)" if first else f"{head}\ny (mm)", fontsize=7)
+    for column, (name, label) in enumerate((("deformation_map_mm", "deformation towards the board (mm)"),
+                                            ("tactile_map", "taxels, counts of an ideal readout"))):
+        axes = grid[:, first + 2 * column:first + 2 * column + 2]
+        shown = _draw_fingers(data, axes, name)
+        figure.colorbar(shown, ax=axes, label=label, shrink=0.6).ax.tick_params(labelsize=7)
     save(figure, path)
+
+
+def _draw_fingers(data, grid, name):
+    """Images of an array for each event and finger on axes (event, 2), all of one scale, which is that of the last image."""
+    highest = max(float(data[name].max()), 1e-9)
+    extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+    for (event, finger), axes in np.ndenumerate(grid):
+        force, model = -float(data.force_n[int(data.event_row[event]), finger, 2]), data.model.values[event, finger]
+        axes.set_title(f"{data.finger.values[finger]}, {force:.3g} N\n{model}", fontsize=8)
+        shown = axes.imshow(data[name][event, finger], origin="lower", extent=extent, vmin=0, vmax=highest, cmap="viridis")
+    return shown
