@@ -77,4 +77,4 @@ def test_the_fits_do_not_depend_on_learning_or_mechanics():
     closure = code_closure("softtact.studies.hybrid.stages.fit_material", source=SOURCE)
     folders = {Path(path).relative_to(SOURCE / "softtact").parts[0] for path in closure}
     assert folders <= {"__init__.py", "checksums.py", "compiled.py", "errors.py", "files.py", "inputs.py", "kernel_files.py",
-                       "outputs.py", "progress.py", "tables.py", "unknown_names.py", "materials", "studies"}
+                       "outputs.py", "progress.py", "tables.py", "unknown_names.py", "workbooks.py", "materials", "studies"}
