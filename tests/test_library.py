@@ -20,7 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 NAMES = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "SolidResult", "SolidSensor",
          "__version__", "load_sensor", "load_solid_sensor", "mesh_body", "read_mesh", "read_press"]
 ALONE = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}     # no path to these sources
-BROUGHT_BY_EXTRAS = sorted(set(EXTRAS) - {"pypardiso"})     # that one is tried where it is, and SciPy takes its place
+# pypardiso is tried where it is, and SciPy takes its place; trimesh asks for collada as it is imported.
+BROUGHT_BY_EXTRAS = sorted(set(EXTRAS) - {"pypardiso", "collada"})
 
 NOT_FOUND = """\
 import sys
@@ -236,7 +237,7 @@ def test_the_wheel_presses_the_shipped_sensor_in_an_empty_folder(softtact_in, pa
     status, said, complained = softtact_in("press", "part.stl", "--unit", "mm", "--force", 5, "--sensor", "coro", "--model",
                                            "elastic", "--out", "press.nc", "--plot", "press.png")
     assert status == 0, complained
-    assert "model: elastic" in said and (tmp_path / "press.png").stat().st_size > 0
+    assert "elastic model on" in said and (tmp_path / "press.png").stat().st_size > 0
     assert softtact.read_press(tmp_path / "press.nc").normal_force_n.tolist() == [5.0]
 
 
@@ -246,7 +247,7 @@ def test_the_wheel_presses_a_users_own_sensor_of_shipped_materials(softtact_in, 
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump(values))
     status, said, complained = softtact_in("press", "part.stl", "--unit", "mm", "--force", 2, "--sensor", "mine.yaml", "--model",
                                            "elastic")
-    assert status == 0 and "model: elastic" in said, complained
+    assert status == 0 and "elastic model on" in said, complained
 
 
 @pytest.mark.slow

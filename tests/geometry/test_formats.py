@@ -132,6 +132,46 @@ def test_a_step_file_without_the_extra_says_which_extra_reads_it():
     assert "pip install 'softtact[cad]'" in missing_extra(ModuleNotFoundError(name="cascadio"))
 
 
+def file_dae(unit='<unit name="millimeter" meter="0.001"/>', matrix="1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1"):
+    """A box of 20 x 20 x 8 in a DAE file of polygons, moved by a node."""
+    box = trimesh.creation.box(bounds=[[0, 0, 0], [20, 20, 8]])
+    places, faces = " ".join(f"{value:g}" for value in box.vertices.ravel()), " ".join(map(str, box.faces.ravel()))
+    return f"""<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+    <asset><created>2026-01-01T00:00:00Z</created><modified>2026-01-01T00:00:00Z</modified>{unit}<up_axis>Z_UP</up_axis></asset>
+    <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="24">{places}</float_array>
+    <technique_common><accessor source="#a" count="8" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+    <param name="Z" type="float"/></accessor></technique_common></source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+    <triangles count="12"><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles></mesh></geometry>
+    </library_geometries><library_visual_scenes><visual_scene id="s"><node id="n"><matrix>{matrix}</matrix>
+    <instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+    <scene><instance_visual_scene url="#s"/></scene></COLLADA>""".encode()
+
+
+@pytest.mark.parametrize(("unit", "name", "size"), [
+    ('<unit name="millimeter" meter="0.001"/>', "mm", 1.0), ('<unit name="i" meter="0.0254"/>', "inch", 25.4)])
+def test_a_dae_file_is_read_in_its_unit_and_place_and_a_mirrored_body_keeps_its_outside(unit, name, size, tmp_path):
+    pytest.importorskip("collada", reason="pip install 'softtact[cad]'")
+    for matrix, low in (("1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1", 5), ("-1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1", -15)):
+        (tmp_path / "box.dae").write_bytes(file_dae(unit, matrix))
+        mesh = read_mesh(tmp_path / "box.dae", max_size_mm=1e4)
+        np.testing.assert_allclose(mesh.bounds, np.array([[low, 0, 0], [low + 20, 20, 8]]) * size, rtol=1e-6)
+        assert mesh.volume == pytest.approx(3200 * size**3) and mesh.metadata["notes"][0].startswith(f"read in {name}, ")
+
+
+@pytest.mark.parametrize(("content", "words"), [
+    (file_dae()[:900], "not a readable DAE file"),
+    (file_dae('<unit name="parsec" meter="3e16"/>'), "its unit of 3e.16 m is none of"),
+    (b'<!DOCTYPE a [<!ENTITY b "c">]>' + file_dae(), "declares a document type"),
+    (file_dae().replace(b'<instance_visual_scene url="#s"/>', b""), "scene|DAE")], ids=["cut", "unit", "entity", "no scene"])
+def test_a_dae_file_that_is_no_mesh_is_refused_in_a_sentence(content, words, tmp_path):
+    pytest.importorskip("collada", reason="pip install 'softtact[cad]'")
+    (tmp_path / "box.dae").write_bytes(content)
+    with pytest.raises(InputError, match=words) as caught:
+        read_mesh(tmp_path / "box.dae")
+    assert "\n" not in str(caught.value) and str(caught.value).startswith(str(tmp_path / "box.dae"))
+
+
 STEP = step_cylinder(5, 8)
 CYCLE = '<object id="2"><components><component objectid="2"/></components></object>'
 REFUSED = [
@@ -158,7 +198,7 @@ REFUSED = [
     ("two.zip", packed(**{"a.stl": text_stl([BOX]), "b/c.obj": obj_file([BOX])}), "mm",
      "it holds 2 meshes, a.stl, b/c.obj; unpack it"),
     ("none.zip", packed(**{"a.txt": "text", ".b.stl": "x"}), "mm", "it holds no mesh; pack a file of STL"),
-    ("part.dae", b"<COLLADA/>", None, "the format '.dae' is not read; save the mesh as STL, OBJ, PLY, OFF, 3MF, AMF, GLB or STEP"),
+    ("part.igs", b"IGES", None, "the format '.igs' is not read; save the mesh as STL, OBJ, PLY, OFF, 3MF, AMF, DAE, GLB or STEP"),
 ]
 
 

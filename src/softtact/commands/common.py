@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 UNITS = ("mm", "cm", "m", "inch", "in")
-MESH_FILE = "file of a closed body: STL, OBJ, PLY, OFF, 3MF, AMF, GLB or STEP, or one of them in a ZIP archive"
+MESH_FILE = "file of a closed body: STL, OBJ, PLY, OFF, 3MF, AMF, DAE, GLB or STEP, or one of them in a ZIP archive"
 EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, meaning in EXIT_STATUS.items())
 
 

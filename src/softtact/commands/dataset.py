@@ -21,7 +21,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "dataset", _dataset, "Random presses of objects as a data set for learning.", EXAMPLES)
     command.add_argument("mesh", metavar="OBJECT", type=Path, nargs="+",
-                         help="mesh files of closed bodies (STL, OBJ, PLY, OFF, 3MF, AMF, GLB, STEP), or folders")
+                         help="mesh files of closed bodies (STL, OBJ, PLY, OFF, 3MF, AMF, DAE, GLB, STEP), or folders")
     add_unit(command)
     add_repair(command)
     command.add_argument("--presses", type=int, required=True, metavar="N", help="in all; the objects take turns")

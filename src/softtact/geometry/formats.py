@@ -1,6 +1,7 @@
 """Mesh files of all formats that are read: their facets, and the unit that they state.
 
-STL, OBJ, PLY and OFF state no unit. 3MF, AMF and STEP state it, that of GLB is the metre. A ZIP archive holds one of these files.
+STL, OBJ, PLY and OFF state no unit. 3MF, AMF, DAE and STEP state it, that of GLB is the metre. A ZIP archive holds one of these
+files.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.geometry.archives import Archive
 from softtact.geometry.cad import CHORD_MM, read_glb, read_step
+from softtact.geometry.dae import read_dae
 from softtact.geometry.obj import read_obj
 from softtact.geometry.off import read_off
 from softtact.geometry.ply import read_ply
@@ -56,6 +58,12 @@ def _glb(path: Path, data: bytes) -> Facets:
                                                     "points up in glTF: --pose turns the object",))
 
 
+def _dae(path: Path, data: bytes) -> Facets:
+    triangles, unit, up = read_dae(path, data)
+    return Facets(triangles, unit, notes=(f"read in {unit}, the unit that the file states; its axes stay as they are, and {up} "
+                                          "points up: --pose turns the object",))
+
+
 def _step(path: Path, data: bytes) -> Facets:
     triangles, units = read_step(path, data)
     facets = f"its curved faces are facets within {CHORD_MM:g} mm"
@@ -67,12 +75,12 @@ def _step(path: Path, data: bytes) -> Facets:
 _READERS: dict[str, Callable[[Path, bytes], Facets]] = {
     ".stl": _without_unit(read_stl), ".obj": _without_unit(read_obj), ".ply": _without_unit(read_ply),
     ".off": _without_unit(read_off), ".3mf": _with_unit(read_3mf), ".amf": _with_unit(read_amf),
-    ".glb": _glb, ".step": _step, ".stp": _step}
+    ".dae": _dae, ".glb": _glb, ".step": _step, ".stp": _step}
 MESHES = tuple(_READERS)
 """Endings of mesh files."""
 SURFACES = (*MESHES, ".zip")
 """Endings of mesh files and of archives of one."""
-NAMES = "STL, OBJ, PLY, OFF, 3MF, AMF, GLB or STEP"
+NAMES = "STL, OBJ, PLY, OFF, 3MF, AMF, DAE, GLB or STEP"
 """The formats, in the words of messages and help."""
 
 

@@ -59,7 +59,7 @@ def read_mesh(path: str | Path, *, unit: str | None = None, min_size_mm: float =
               max_size_mm: float = MAX_SIZE_MM) -> trimesh.Trimesh:
     """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the frame of the file.
 
-    path : STL (binary or text), OBJ, PLY, OFF, 3MF, AMF, GLB or STEP, or a ZIP archive of one of them
+    path : STL (binary or text), OBJ, PLY, OFF, 3MF, AMF, DAE, GLB or STEP, or a ZIP archive of one of them
     unit : 'mm', 'cm', 'm', 'inch' or 'in'; needed where the format states none (STL, OBJ, PLY, OFF), else it must be the file's
     min_size_mm, max_size_mm : range of a plausible largest side
 
