@@ -13,6 +13,7 @@ from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
+from softtact.press.cache import in_words
 from softtact.press.making import make_result, shell_of
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
@@ -23,6 +24,7 @@ from softtact.readout.registry import Samples
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
+_FIRST_S, _STEP_S, _FRUSTA = 17.0, 1.2, 540     # of a press and of each load step, for so many frusta
 _CORNER = 0.01            # share of a layer that may exceed the data: strains at an edge of the object always exceed them
 
 
@@ -38,7 +40,8 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
         path.check_motion(forces)
     body = sensor.body(threads=control.threads, surface=_swept(surface, forces))
     if control.label:
-        announce(f"{control.label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model")
+        steps = f"{count} load step{'s' * (count > 1)}"
+        announce(f"{control.label}: {sensor.spec.parts_in_words}, {steps} of the hyperelastic model{_time_in_words(sensor, count)}")
     body.watch = Watch(control.label, limit_s=control.time_limit_s)
     record = _Record(sensor, body, touch, control)
     load_steps = map(record.take, _allowed(_load_steps(sensor, body, surface, forces, touch), sensor, surface, forces, touch))
@@ -48,6 +51,14 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
     finally:
         body.watch.end()
         body.close()
+
+
+def _time_in_words(sensor, count):
+    """How long a press with the default mesh takes on two idle cores, after docs/performance.md; nothing without frusta."""
+    if np.isnan(sensor.spec.frustum_height_mm):
+        return ""
+    seconds = (_FIRST_S + _STEP_S * count) * np.prod(sensor.spec.frusta_counts) / _FRUSTA
+    return f": {in_words(seconds)} on two idle cores, more for fine details"
 
 
 def _load_steps(sensor, body, surface, forces, touch_mm):
