@@ -177,6 +177,7 @@ def test_the_names_of_plane_elements_state_their_geometry(read, kind, geometry, 
 def test_keywords_in_any_case_with_continued_lines_comments_and_exponents_of_fortran(read):
     text = "** a comment\n" + PLAIN.replace("*ELEMENT, TYPE=C3D4", "*ELEMENT,\nTYPE=C3D4, ELSET=GEL")
     assert sizes(read(text.lower())) == {"gel": 48}
+    assert sizes(read("\ufeff" + text.removeprefix("** a comment\n"))) == {"GEL": 48}     # the mark of UTF-8 of Windows
     assert read(text.replace("1, 0, 0, 0\n", "1, 0.D0, 0d+0, 0\n")).mesh.volume_mm3() == pytest.approx(BLOCK_MM3)
 
 
@@ -193,6 +194,7 @@ def test_files_are_included_from_the_folder_of_the_deck(read):
     for text, files in (("*INCLUDE, INPUT=nodes.inp\n" + elements, {"nodes.inp": inp_nodes(NODES)}),
                         ("*include, input=\"all.inp\"\n", {"all.inp": "*INCLUDE, INPUT=nodes.inp\n" + elements,
                                                              "nodes.inp": inp_nodes(NODES)}),
+                        ("*INCLUDE, INPUT=.\\nodes.inp\n" + elements, {"nodes.inp": inp_nodes(NODES)}),
                         ("*NODE, INPUT=nodes.dat\n" + elements, {"nodes.dat": inp_nodes(NODES).partition("\n")[2]})):
         assert sizes(read(text, files)) == {"GEL": 48}
 

@@ -126,3 +126,24 @@ def test_what_cannot_be_read_right_is_refused(tmp_path):
         with pytest.raises(InputError, match=told) as refusal:
             read_body(tmp_path / "body.msh", unit="mm")
         assert "\n" not in str(refusal.value)
+
+
+def test_comments_may_stand_before_the_format(tmp_path):
+    content = msh22(NODES, [(4, 1, 1, TETRA)], [(3, 1, "gel")])
+    (tmp_path / "body.msh").write_bytes(b"$Comments\nby hand\n$EndComments\n" + content)
+    assert read_body(tmp_path / "body.msh", unit="mm").mesh.regions == ["gel"]
+
+
+def test_groups_whose_elements_have_lost_them_are_told(tmp_path):
+    (tmp_path / "body.msh").write_bytes(msh22(NODES, [(4, 0, 1, TETRA)], NAMES))
+    body = read_body(tmp_path / "body.msh", unit="mm")
+    assert body.mesh.regions == ["body"] and "groups without elements: top, skin, base, gel" in body.remarks[0]
+
+
+def test_a_face_between_two_regions_is_left_out_with_a_word(read):
+    hexes = hexahedra()[1]
+    between = hexes[:4, 4:]
+    body = read([(2, 1, [2], 3, between), (3, 1, [1], 5, hexes[:4]), (3, 2, [3], 5, hexes[4:])],
+                [(2, 2, "interface"), (3, 1, "lower"), (3, 3, "upper")])
+    assert body.mesh.regions == ["lower", "upper"] and not body.mesh.faces
+    assert body.remarks == ["the face interface is left out, because 4 of its facets are inside the body"]

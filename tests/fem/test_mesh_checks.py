@@ -92,6 +92,15 @@ def test_elements_that_share_no_node_at_all_are_told(read):
     assert "pairs of nodes lie in one place and are not joined" in body.remarks[1]
 
 
+def test_an_axisymmetric_body_that_reaches_beyond_its_axis_is_refused(read):
+    def axisymmetric(path, unit):
+        return read_body(path, unit=unit, geometry="axisymmetric")
+    square, quads = NODES[:9], HEXES[:4, :4]
+    assert read(square, ("quad", quads), reader=axisymmetric).mesh.volume_mm3() == pytest.approx(64 * np.pi)
+    with pytest.raises(InputError, match=r"10 nodes lie beyond the axis x = 0 \(one at -2, "):
+        read(square - [2, 0, 0], ("quad", quads), reader=axisymmetric)
+
+
 def test_collapsed_and_repeated_elements_are_refused(read):
     with pytest.raises(InputError, match="1 elements have a node twice"):
         read(NODES, ("hexahedron", np.vstack([HEXES[1:], [[0, 1, 4, 4, 9, 10, 13, 13]]])))

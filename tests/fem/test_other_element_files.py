@@ -114,8 +114,7 @@ def test_a_file_of_which_cells_would_be_lost_is_refused(tmp_path):
     with pytest.raises(InputError, match="only 48 of its 96 cells can be read; save it in one piece"):
         read_body(tmp_path / "body.vtu", unit="mm")
     text = nastran(tmp_path).read_text()
-    for wrong, told in ((text.replace("CTETRA,1,", " ctetra,1,"), "only 47 of its 48 cells"),
-                        (text.replace("CTETRA,9,", "CTETRA*,9,"), "only 47 of its 48 cells"),
+    for wrong, told in ((text.replace("CTETRA,9,", "CTETRA*,9,"), "only 47 of its 48 cells"),
                         (text.replace("GRID,4,,", "GRID,4,1,"), "field CP of GRID")):
         (tmp_path / "body.bdf").write_text(wrong)
         with pytest.raises(InputError, match=told):
@@ -127,3 +126,38 @@ def test_a_region_and_a_face_of_one_name_survive_softtact_s_own_file(tmp_path):
     write_mesh(mesh, tmp_path / "body.vtu")
     found = read_body(tmp_path / "body.vtu")
     assert found.mesh.regions == ["gel"] and len(found.mesh.faces["gel"]["quad9"]) == 1 and not found.remarks
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("shape", ["tetra", "hexahedron"])
+def test_elements_of_med_are_turned_the_other_way_round(shape, order, tmp_path):
+    nodes, cells = (NODES, TETRA) if shape == "tetra" else hexahedra()
+    corners = {"tetra": [0, 2, 1, 3], "hexahedron": [0, 3, 2, 1, 4, 7, 6, 5]}[shape]
+    turned, kind = cells[:, corners], shape
+    if order == 2:      # the edges of the turned corners in the order of the manual of MED
+        edges = {"tetra": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
+                 "hexahedron": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]}
+        pairs = turned[:, edges[shape]].reshape(-1, 2)
+        kind, middles = {"tetra": "tetra10", "hexahedron": "hexahedron20"}[shape], np.arange(len(pairs)).reshape(len(turned), -1)
+        turned, nodes = np.hstack([turned, len(nodes) + middles]), np.vstack([nodes, nodes[pairs].mean(axis=1)])
+        nodes, number = np.unique(nodes, axis=0, return_inverse=True)
+        turned = number.ravel()[turned]
+    meshio.Mesh(nodes, [(kind, turned)]).write(tmp_path / "body.med")
+    assert read_body(tmp_path / "body.med", unit="mm").mesh.volume_mm3() == pytest.approx(BLOCK_MM3)
+
+
+def test_bulk_data_of_nastran_needs_no_beginning_and_may_be_in_small_letters(tmp_path):
+    text = nastran(tmp_path).read_text()
+    for written in (text.removeprefix("BEGIN BULK\n"), text.lower(), "SOL 101\nCEND\nTITLE = x\n" + text):
+        (tmp_path / "body.bdf").write_text(written)
+        assert read_body(tmp_path / "body.bdf", unit="mm").mesh.regions == ["3", "7"]
+    for card, told in (("include 'nodes.bdf'", "include 'nodes.bdf' is not read; put that file in its place"),
+                       ("GRDSET,,5", "GRDSET is not read")):
+        (tmp_path / "body.bdf").write_text(text.replace("BULK\n", f"BULK\n{card}\n"))
+        with pytest.raises(InputError, match=told):
+            read_body(tmp_path / "body.bdf", unit="mm")
+
+
+def test_an_array_that_may_name_regions_is_told_where_it_is_left_out(tmp_path):
+    body = read_body(paraview(tmp_path, name="label"), unit="mm")
+    assert body.mesh.regions == ["body"] and "the array label of whole numbers is left out" in body.remarks[0]

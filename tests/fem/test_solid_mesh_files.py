@@ -76,8 +76,9 @@ def test_sets_of_abaqus_and_groups_of_gmsh_name_regions_and_faces(tmp_path):
 def test_faulty_files_and_rules_are_refused_with_the_place(tmp_path):
     good = write(tmp_path / "good.vtu", [("tetra", TETRAHEDRA)])
     (tmp_path / "text.vtu").write_text("no mesh")
-    inner = write(tmp_path / "inner.msh", [("tetra", TETRAHEDRA), ("triangle", np.array([[1, 3, 4]]))],
-                  cell_data={"gmsh:physical": [np.full(5, 1), np.array([2])], "gmsh:geometrical": [np.full(5, 1), np.array([2])]},
+    outer = next(iter(read_mesh_file(good, unit="mm").boundary.values()))[0, :3]
+    inner = write(tmp_path / "inner.msh", [("tetra", TETRAHEDRA), ("triangle", np.array([[1, 3, 4], outer]))],
+                  cell_data={"gmsh:physical": [np.full(5, 1), np.full(2, 2)], "gmsh:geometrical": [np.full(5, 1), np.full(2, 2)]},
                   field_data={"soft": np.array([1, 3]), "inside": np.array([2, 2])})
     for path, options, told in [
         (tmp_path / "none.vtu", {"unit": "mm"}, "no such mesh file"),

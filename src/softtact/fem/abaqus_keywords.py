@@ -93,7 +93,7 @@ def _lines(path: Path, above: tuple[Path, ...]) -> Iterator[tuple[Path, int, str
         raise InputError(f"{path}: it includes itself, by way of {above[-1].name}; leave one of the two *INCLUDE out.")
     if len(above) > MOST_FILES_DEEP:
         raise InputError(f"{path}: files are included more than {MOST_FILES_DEEP} deep; put them into fewer files.")
-    lines = enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1)
+    lines = enumerate(path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), start=1)
     for number, line in lines:
         text = line.strip()
         if text.startswith("**"):
@@ -115,6 +115,6 @@ def _lines(path: Path, above: tuple[Path, ...]) -> Iterator[tuple[Path, int, str
 
 
 def _included(path, number, name, above):
-    file = path.parent / name
+    file = path.parent / name.replace("\\", "/")     # as Windows writes folders
     check_input(file, "mesh", missing=f"there is no such file, which {path.name} includes in line {number}; put it there.")
     yield from _lines(file, above)

@@ -125,6 +125,10 @@ def read_gmsh(path: Path) -> RawMesh:
             raise content.refusal(f"an element has the node {nodes[missing][0]}, which is not in the file; save it again")
         tables[kind] = (order[at], of)
     raw = _with_groups(points, tables, names)
+    used = {(dimension_of(kind), tag) for kind, (_, of) in tables.items() for tag in frozenset().union(*set(of))}
+    if empty := [name for group, name in names.items() if group not in used]:
+        raw.remarks.append(f"groups without elements: {', '.join(empty)} (in msh 2.2, Mesh.SaveAll writes elements without their "
+                           "groups)")
     if copies:
         raw.remarks.append(f"{copies} elements or facets stand there again, without another group, and count once")
     return raw

@@ -143,7 +143,7 @@ def _read(path: Path) -> RawMesh:
     if path.suffix.lower() == ".inp":
         return read_abaqus(path)
     with path.open("rb") as file:
-        of_gmsh = file.read(200).lstrip().startswith(b"$MeshFormat")
+        of_gmsh = re.search(rb"^\$MeshFormat", file.read(4000), re.MULTILINE) is not None     # below comments, too
     return read_gmsh(path) if of_gmsh else read_other(path)
 
 
@@ -225,7 +225,7 @@ def _faces(path, raw, mesh, number, d):
             remarks.append(f"the face {name} is left out, because it is not on the body")
         elif not (inner := {tuple(sorted(row)) for block in known for row in block.tolist()} - outer):
             named[name] = _face(mesh, known)
-        elif raw.numbered:
+        elif raw.numbered or not any(tuple(sorted(row)) in outer for block in known for row in block.tolist()):
             remarks.append(f"the face {name} is left out, because {len(inner)} of its facets are inside the body")
         else:
             at = [row for one, old in zip(known, corners, strict=True) for row, places in zip(old, one, strict=True)

@@ -37,6 +37,12 @@ _UNHANDLED = {"pixel", "wedge15", *(f"vtk_{order}_{shape}" for order in ("lagran
     "curve", "triangle", "quadrilateral", "tetrahedron", "hexahedron", "wedge", "pyramid"))}
 _DROPPED = re.compile(r"cannot handle \(type (\d+)\)|doesn't know \w*(?:Tetra|Hexa|Prism|Pyramid|Triangles|Quadri)\w* type")
 _NASTRAN = (".bdf", ".nas", ".fem")
+_NOT_READ = re.compile(r"^[ \t]*(INCLUDE\b.{,60}|GRDSET\b)", re.MULTILINE | re.IGNORECASE)
+# Corners of MED's elements in VTK's order; between them the edges have one order in both.
+_MED = {"tetra": [0, 2, 1, 3], "hexahedron": [0, 3, 2, 1, 4, 7, 6, 5], "wedge": [0, 2, 1, 3, 5, 4]}
+_EDGES = {"tetra": [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)],
+          "hexahedron": [(0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7)]}
+_MOST_NUMBERS = 1000     # in an array of cells, which may be names of parts
 _COUNT = re.compile(rb"(?:\A|^[ \t]*(?:[A-Za-z]+[ \t]+)?)(\d{3,})(?=[ \t\r]*$|[ \t]+3[ \t])", re.MULTILINE)
 _CARD = re.compile(rb"^[ \t]*C(?:TETRA|HEXA|PENTA|PYRAM?|TRIA|TRAX|QUAD|SHEAR)\w*\*?[ \t,]", re.IGNORECASE | re.MULTILINE)
 
@@ -49,6 +55,8 @@ def read_other(path: Path) -> RawMesh:
               for block in read.cells]
     points = np.zeros((len(read.points), 3))
     points[:, :read.points.shape[1]] = read.points
+    if path.suffix.lower() == ".med":
+        blocks = [(kind, _from_med(points, kind, nodes)) for kind, nodes in blocks]
     raw = RawMesh(points, blocks, remarks=[f"meshio warns: {one}" for one in said])
     _take_sets(read, raw)
     if not raw.regions and not raw.faces:
@@ -72,7 +80,7 @@ def _read(path: Path) -> tuple["meshio.Mesh", list[str]]:
     with in_one_sentence(path, "not readable as a mesh of elements", known):
         try:
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-                read = meshio.read(path)
+                read = meshio.read(path) if path.suffix.lower() not in _NASTRAN else meshio.read(_bulk_data(path), "nastran")
         except SystemExit:     # meshio ends the program for an unknown format
             text = " ".join(printed.getvalue().split()).removeprefix("Error: ")
             raise ValueError(text or "unknown format") from None
@@ -82,6 +90,20 @@ def _read(path: Path) -> tuple["meshio.Mesh", list[str]]:
             raise
     warned = " ".join(printed.getvalue().split()).split("Warning: ")[1:]
     return read, list(dict.fromkeys(one.strip().rstrip(".") for one in warned))
+
+
+def _bulk_data(path):
+    """The text of a file of Nastran from BEGIN BULK on, which many programs leave out, in capitals.
+
+    Raises InputError for cards that meshio passes over.
+    """
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    begin = re.search(r"^[ \t]*BEGIN[ \t]+BULK.*\n", text, re.MULTILINE | re.IGNORECASE)
+    bulk = text[begin.end():] if begin else text
+    if found := _NOT_READ.search(bulk):
+        remedy = "put that file in its place" if found[1].upper().startswith("INCLUDE") else "write its fields into each GRID"
+        raise InputError(f"{path}: {found[1].strip()} is not read; {remedy}.")
+    return io.StringIO("BEGIN BULK\n" + bulk.upper())
 
 
 def _refuse_impossible_counts(path):
@@ -132,6 +154,21 @@ def _block(path, kind, nodes):
     return kind, nodes
 
 
+def _from_med(points, kind, nodes):
+    """Nodes (e, m) in VTK's order. MED turns elements the other way round; meshio writes such files without turning them."""
+    shape = kind.rstrip("0123456789")
+    if shape not in _MED or not len(nodes):
+        return nodes
+    apex = 4 if shape == "hexahedron" else 3
+    a, b, c, top = (points[nodes[:, k]] for k in (0, 1, 2, apex))
+    if np.median(np.einsum("ei,ei->e", np.cross(b - a, c - a), top - a)) >= 0:
+        return nodes
+    corners, edges = _MED[shape], _EDGES.get(shape, [])
+    middles = [len(corners) + edges.index((min(pair), max(pair))) for a, b in edges for pair in [(corners[a], corners[b])]]
+    order = [*corners, *middles]
+    return nodes[:, [*order, *range(len(order), nodes.shape[1])][: nodes.shape[1]]]
+
+
 def _take_sets(read, raw):
     """Regions and faces by name: of softtact, sets of cells, groups of MED."""
     lengths = [len(nodes) for _, nodes in raw.blocks]
@@ -151,6 +188,9 @@ def _take_sets(read, raw):
 def _take_numbers(read, raw):
     """Regions and faces by their numbers, where the file has an array of those; 0 is no face."""
     arrays = {name: values for name, values in read.cell_data.items() if re.sub(r"[^a-z0-9]", "", name.lower()) in _NUMBERS}
+    if not arrays:
+        raw.remarks += [f"the array {name} of whole numbers is left out; call it MaterialIDs if it names the regions"
+                        for name, values in read.cell_data.items() if _may_name_parts(name, values)]
     for name, values in arrays.items():
         numbers = [np.ravel(one) for one in values]
         if not all(len(one) == len(nodes) for one, (_, nodes) in zip(numbers, raw.blocks, strict=True)):
@@ -167,6 +207,13 @@ def _take_numbers(read, raw):
         if others := [other for other in arrays if other != name]:
             raw.remarks.append(f"the regions are those of the array {name}; left out: {', '.join(others)}")
         return
+
+
+def _may_name_parts(name, values):
+    """Whether an array of cells has a few different whole numbers."""
+    found = np.concatenate([np.ravel(one) for one in values])
+    whole = found.dtype.kind in "iu" and all(np.ndim(one) == 1 for one in values)
+    return whole and not name.startswith(("vtk", GEOMETRY)) and 1 < len(np.unique(found)) <= min(_MOST_NUMBERS, len(found) // 2)
 
 
 def _take_set(raw, name, flags: Flags):
