@@ -7,12 +7,14 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import trimesh
 
 from softtact.compiled import compiled
 
+_KEPT: "WeakKeyDictionary[trimesh.Trimesh, HeightField]" = WeakKeyDictionary()     # by their contents' hash
 NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 
 
@@ -31,6 +33,14 @@ class HeightField:
         self._origin, self._size = low, np.maximum((high - low) / bins, 1e-6)
         self._starts, self._members = _fill_bins(self.triangles, self._origin, self._size, bins)
         self._bins = bins
+
+    @classmethod
+    def of(cls, mesh: trimesh.Trimesh) -> "HeightField":
+        """That of a mesh, made once for as long as the mesh lives and stays as it is: the steps of one press ask for it in turn."""
+        found = _KEPT.get(mesh)
+        if found is None:
+            found = _KEPT[mesh] = cls(mesh)
+        return found
 
     def _plan_bounds(self):
         if not len(self.triangles):

@@ -39,7 +39,7 @@ def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control
     """Press all load steps at once with the elastic model, which has only the surface's compliance and no body to keep."""
     start = time.perf_counter()
     sensor.prepared("elastic", control.threads)
-    surface = HeightField(placed)
+    surface = HeightField.of(placed)
     touch = first_touch_mm(sensor, surface)
     press = _elastic(sensor, surface, forces, touch)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
@@ -118,7 +118,7 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, c
     """Press load step by load step with the foundation model, which has no body to keep."""
     start = time.perf_counter()
     sensor.prepared("foundation", control.threads)
-    return _on_foundation(sensor, _near_touch(sensor, HeightField(placed)), forces, control, start)
+    return _on_foundation(sensor, _near_touch(sensor, HeightField.of(placed)), forces, control, start)
 
 
 def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, control: RunControl, start: float) -> PressResult:
@@ -230,7 +230,7 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cont
             control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds, placed, motion))
         raise
     found = _of_motion(sensor, moved, seconds, placed, motion)
-    if not _between_nodes(sensor, HeightField(placed)):
+    if not _between_nodes(sensor, HeightField.of(placed)):
         return found
     warnings.warn("The object has walls or pins that fall between the points of the elastic model's surface in some places of the "
                   "motion: no step is within its validity; use the hyperelastic model.", NarrowPartWarning, stacklevel=4)
@@ -256,7 +256,7 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
     if "elastic_surface" not in sensor.prepared_models:
         sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
     compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
-    shell, surface, start = shell_of(sensor), HeightField(placed), time.perf_counter()
+    shell, surface, start = shell_of(sensor), HeightField.of(placed), time.perf_counter()
     watch = Watch(label, limit_s=limit_s)
 
     def note(state: SlidingState) -> None:
@@ -272,7 +272,7 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
 def _of_motion(sensor, moved, seconds, placed, motion):
     """The result of an `ElasticMotion` of a placed mesh along a `Motion`, or of its first steps."""
     unknown, spec = np.full(len(moved.depth_mm), np.nan), sensor.spec
-    touch = HeightField(placed).first_touch_mm(spec.map_x_mm, spec.map_y_mm)
+    touch = HeightField.of(placed).first_touch_mm(spec.map_x_mm, spec.map_y_mm)
     followed = MovedObject(placed, touch, motion.aside_mm[:len(unknown)], moved.depth_mm, np.zeros(len(unknown)))
     plane = PlaneMotion(spec.map_x_mm, spec.map_y_mm, moved.displacement_mm, moved.traction_mpa, moved.slides, moved.gap_mm)
     attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}

@@ -47,7 +47,7 @@ def press_gel(sensor: "Sensor", placed: Trimesh, given: np.ndarray | Motion, con
     the steps before, where a step is not reached.
     """
     motion = given if isinstance(given, Motion) else Motion().press(force_n=list(given))
-    spec, surface, layer = sensor.spec, HeightField(placed), sensor.prepared("elastic")
+    spec, surface, layer = sensor.spec, HeightField.of(placed), sensor.prepared("elastic")
     touch = surface.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
     _refuse_leaving(spec, surface, touch, motion)
     about = tuple(placed.bounds.mean(axis=0)[:2].tolist())

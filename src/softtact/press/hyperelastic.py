@@ -33,7 +33,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 
     A ConvergenceError, which a time limit raises too, and a KeyboardInterrupt hold the load steps before.
     """
-    surface = HeightField(placed)
+    surface = HeightField.of(placed)
     touch = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):

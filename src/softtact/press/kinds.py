@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
-from threadpoolctl import threadpool_limits
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
 from softtact.geometry.meshes import check_over_sensor, place
+from softtact.linalg.workers import threads_of_blas
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
@@ -143,7 +143,7 @@ def _by_forces(sensor, task, press, *, threads=1):
 
     task.control.reached.finish = finished
     # With more threads, dense products of some hundred rows wait for each other and take up to five times as long.
-    with threadpool_limits(limits=threads):
+    with threads_of_blas(threads):
         return task.control.reached.finish(press(sensor, placed, forces, task.control))
 
 
@@ -157,7 +157,7 @@ def _by_motion(sensor, task, press, *, threads=1):
         return result if times is None else replace(result, time_s=times[:result.steps])
 
     task.control.reached.finish = finished
-    with threadpool_limits(limits=threads):
+    with threads_of_blas(threads):
         return task.control.reached.finish(press(sensor, placed, task.motion, task.control))
 
 
@@ -165,7 +165,7 @@ def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callabl
     """The object in its pose over the sensor, and a function that completes each result: flags, and the object if it is kept."""
     placed = place(task.pressed, pose=task.pose)      # type: ignore[arg-type]
     check_over_sensor(placed, sensor.spec.footprint_mm)
-    touch = HeightField(placed).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+    touch = HeightField.of(placed).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
 
     def finish(result: PressResult) -> PressResult:
         result = flag_buried(result, float(placed.bounds[1, 2]) - touch)
