@@ -68,8 +68,9 @@ def answer(capsys):
     return run
 
 
-NAMES = ("press", "grasp", "grasps", "skin", "palpate", "dataset", "view", "calibrate", "calibrate-camera", "predict", "complexity",
-         "fit", "mesh", "export-deck", "detect-discs", "cost", "stage", "config-example", "config-schema", "completion")
+NAMES = ("press", "play", "grasp", "grasps", "skin", "palpate", "dataset", "view", "calibrate", "calibrate-camera", "predict",
+         "complexity", "fit", "mesh", "export-deck", "detect-discs", "cost", "stage", "config-example", "config-schema",
+         "completion")
 
 
 def test_every_commands_help_has_examples_and_the_exit_statuses(capsys):

@@ -31,6 +31,7 @@ ORDER = (
     ("evaluation",),
     ("reporting",),
     ("studies",),
+    ("play",),
     ("commands",),
     ("cli",),
     ("__main__",),

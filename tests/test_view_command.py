@@ -134,10 +134,11 @@ def test_view_writes_a_page_and_a_picture_and_says_so_in_json(press_nc, tmp_path
 def test_view_opens_a_browser_where_there_is_one_and_draws_where_there_is_none(press_nc, tmp_path, monkeypatch, capsys):
     opened = []
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(view_command, "_browser", lambda: type("B", (), {"open": lambda self, url: opened.append(url) or True})())
+    browser = type("B", (), {"open": lambda self, url: opened.append(url) or True})()
+    monkeypatch.setattr(view_command, "find_browser", lambda: browser)
     assert main(["view", str(press_nc)]) == 0 and "opened:" in capsys.readouterr().out
     assert opened[0].startswith("file://") and opened[0].endswith("press.html")
-    monkeypatch.setattr(view_command, "_browser", lambda: None)
+    monkeypatch.setattr(view_command, "find_browser", lambda: None)
     assert main(["view", str(press_nc)]) == 0
     assert "no browser" in capsys.readouterr().err and Path("press.nc.png").stat().st_size > 10_000
 

@@ -27,6 +27,7 @@ from softtact.commands import (
     grasps,
     mesh,
     palpate,
+    play,
     predict,
     press,
     skin,
@@ -36,8 +37,8 @@ from softtact.commands import (
 from softtact.commands.common import EXIT_TEXT
 from softtact.exits import run_to_status
 
-COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, calibrate_camera, predict, fit, mesh, export_deck,
-            detect_discs, cost, stage, config_example, completion)
+COMMANDS = (press, play, grasp, grasps, skin, palpate, dataset, view, calibrate, calibrate_camera, predict, fit, mesh,
+            export_deck, detect_discs, cost, stage, config_example, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
   softtact grasp part.stl --unit mm --force 20 --out results/grasp   # a robot grasps it: both sensors

@@ -3,7 +3,7 @@
 from typing import Any
 
 EXTRAS = {"snakemake": "workflow", "jinja2": "workflow", "torch": "learn", "optuna": "learn", "pyvista": "view", "vtk": "view",
-          "vtkmodules": "view", "av": "optics", "pypardiso": "mkl", "openpyxl": "excel", "skfem": "skin",
+          "vtkmodules": "view", "viser": "view", "av": "optics", "pypardiso": "mkl", "openpyxl": "excel", "skfem": "skin",
           "mujoco": "robot", "gymnasium": "robot", "pytetwild": "mesh", "warp": "device", "cascadio": "cad", "collada": "cad",
           "rosbags": "ros", "pyarrow": "lerobot"}
 

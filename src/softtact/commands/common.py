@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -11,6 +12,8 @@ from softtact.errors import InputError
 from softtact.exits import EXIT_STATUS
 
 if TYPE_CHECKING:
+    from webbrowser import BaseBrowser
+
     import trimesh
 
     from softtact.geometry.pose import Pose
@@ -168,3 +171,14 @@ def any_sensor_spec(name: str) -> Any:
 def short(value: object) -> str:
     """A number with four digits, anything else unchanged."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def find_browser() -> "BaseBrowser | None":
+    """The browser, or None without a screen or a browser."""
+    import webbrowser
+
+    screen = sys.platform in ("darwin", "win32") or any(name in os.environ for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
+    try:
+        return webbrowser.get() if screen else None
+    except webbrowser.Error:
+        return None

@@ -1,12 +1,11 @@
 """`softtact view`: a pressed sensor in a browser, or as a picture; a recording as pictures over time."""
 
 import argparse
-import os
 import sys
 import tempfile
 from pathlib import Path
 
-from softtact.commands.common import add_command, check_names, show
+from softtact.commands.common import add_command, check_names, find_browser, show
 from softtact.errors import InputError
 from softtact.outputs import check_outputs, refuse_overwriting
 
@@ -57,7 +56,7 @@ def _view(options):
     result = {"page": None, "picture": None, "opened": False, "drawn_with": None, "triangles": len(view.triangles)}
     picture, page = options.save, options.page
     if not picture and not page:
-        browser = _browser()
+        browser = find_browser()
         if browser:
             page = Path(tempfile.mkdtemp(prefix="softtact-")) / f"{options.result.stem}.html"
         else:
@@ -102,17 +101,6 @@ def _view_recording(options):
     show(result, as_json=options.json, lines=[
         f"{result['readings']} readings in {result['seconds']:.3g} s, up to {result['largest_counts']:g} counts",
         f"written: {picture}"])
-
-
-def _browser():
-    """The browser, or None without a screen or a browser."""
-    import webbrowser
-
-    screen = sys.platform in ("darwin", "win32") or any(name in os.environ for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
-    try:
-        return webbrowser.get() if screen else None
-    except webbrowser.Error:
-        return None
 
 
 def _lines(result):

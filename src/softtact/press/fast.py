@@ -32,18 +32,50 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 _ROUND_OFF = 1e-6         # of a force
+# Search of the force at a depth: the least force over the largest, force over depth to this power at first, and the relative error.
+_LEAST_FORCE, _POWER, _DEPTH_TOLERANCE, _SECANTS = 1e-6, 1.3, 2e-3, 40
 _NEAR_MM = 0.1            # height over the sensing surface, or depth below it, beyond which an object is moved to first touch
 
 
 def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl) -> PressResult:
     """Press all load steps at once with the elastic model, which has only the surface's compliance and no body to keep."""
-    start = time.perf_counter()
     sensor.prepared("elastic", control.threads)
-    surface = HeightField.of(placed)
+    return press_underside(sensor, HeightField.of(placed), forces)
+
+
+def press_underside(sensor: "Sensor", surface: HeightField, forces: np.ndarray) -> PressResult:
+    """The elastic model's press through forces (l,) in N of an object by its underside, which presses of one object can share."""
+    start = time.perf_counter()
     touch = first_touch_mm(sensor, surface)
     press = _elastic(sensor, surface, forces, touch)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
     return elastic_result(sensor, press, forces, seconds, touch_mm=touch)
+
+
+def force_at_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, guess_n: float) -> float:
+    """The force (N) at which the elastic model's object is `depth_mm` below first touch; the sensor's largest if none suffices.
+
+    surface: the underside of the object;  guess_n: a force nearby
+    """
+    touch = first_touch_mm(sensor, surface)
+    low, high = np.log(_LEAST_FORCE * sensor.spec.force_range_n[1]), np.log(sensor.spec.force_range_n[1])
+    wanted, force, power, before = np.log(depth_mm), float(np.clip(np.log(guess_n), low, high)), _POWER, None
+    for _ in range(_SECANTS):
+        depth = _elastic(sensor, surface, np.exp([force]), touch).contact.depth[-1] - touch
+        reached = np.log(max(depth, np.finfo(float).tiny))
+        if abs(reached - wanted) <= _DEPTH_TOLERANCE:
+            break
+        low, high = (force, high) if reached < wanted else (low, force)
+        if before is not None and reached != before[1]:
+            power = (force - before[0]) / (reached - before[1])
+        before, force = (force, reached), force + power * (wanted - reached)
+        if force >= high and before[0] < high:
+            force = high
+        elif not low < force <= high:
+            force = 0.5 * (low + high)
+        if high - low <= _DEPTH_TOLERANCE:
+            break
+    return float(np.exp(force))
 
 
 def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, *, model: str) -> np.ndarray:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import RectBivariateSpline
 from scipy.linalg import cho_factor, cho_solve
 
 from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
@@ -95,6 +96,32 @@ class InnerPlaneCompliance(Compliance):
     def lower_fields(self, points: ObjectPoints, force: np.ndarray) -> None:
         """None: the layer's lower side is fixed."""
         return None
+
+
+@dataclass(frozen=True)
+class DraftCompliance(Compliance):
+    """A `Compliance` on a coarser grid whose fields are given at the nodes of the whole one, by cubic splines."""
+
+    nodes: tuple[int, int] = (0, 0)
+    """(2 ny - 1, 2 nx - 1) of the whole grid, with sides that are held."""
+
+    def _fields(self, blocks, points, force):
+        coarse = super()._fields(blocks, points, force)
+        over = [(fine - 1) / (few - 1) for fine, few in zip(self.nodes, coarse.shape[1:], strict=True)]
+        places = [np.arange(fine) / share for fine, share in zip(self.nodes, over, strict=True)]
+        return np.stack([RectBivariateSpline(*map(np.arange, one.shape), one)(*places) for one in coarse])
+
+
+def draft_of(spec: BaseSpec, compliance: Compliance) -> DraftCompliance:
+    """The `DraftCompliance` of a sensor from a `Compliance` with `draft_cells`."""
+    rows, columns = spec.map_shape
+    return DraftCompliance(grid=compliance.grid, blocks=compliance.blocks, foundation_modulus=compliance.foundation_modulus,
+                           stencil=compliance.stencil, lower=compliance.lower, nodes=(2 * rows - 1, 2 * columns - 1))
+
+
+def draft_cells(spec: BaseSpec) -> tuple[int, ...]:
+    """Elements along a quarter's sides of a `DraftCompliance`: half as many, so nodes lie at the map's points."""
+    return tuple(max(2, count // 2) for count in map_cells(spec))
 
 
 def map_cells(spec: BaseSpec) -> tuple[int, ...]:

@@ -1,0 +1,285 @@
+"""One tab's session: the newest state is pressed, a coarse map while it changes, the whole map and a long model where it rests.
+
+States that came in during a press are passed over, all but the newest. A `View` shows what is found; this module knows no page.
+"""
+
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from softtact.errors import InputError, SofttactError
+from softtact.play.files import FPS, Folder
+from softtact.play.long_press import LongPress
+from softtact.play.pictures import board
+from softtact.play.solver import Shown, Solver
+from softtact.play.state import Press, State
+from softtact.press.result import PressResult
+
+_RESTS_S = 0.35         # without a change, after which the whole map follows
+_LOOK_S = 0.1           # between two looks at a long press
+_LONGEST_S = 300.0      # of a recording
+LONG_MODELS = ("foundation", "hyperelastic", "auto", "solid")
+
+
+class View(Protocol):
+    """What shows a session."""
+
+    def show(self, shown: Shown) -> None:
+        """Show a press."""
+
+    def refuse(self, sentence: str) -> None:
+        """Show why there is no map."""
+
+    def tell(self, sentence: str) -> None:
+        """Show what a button did, or why it did not."""
+
+    def show_long(self, words: str, result: PressResult | None, elastic: Shown | None) -> None:
+        """Show the progress or the end of a long press; elastic: the elastic map of the same press."""
+
+
+class Tab:
+    """The session of one tab, with a thread that computes."""
+
+    def __init__(self, state: State, view: View, folder: Folder, *, solver: Solver | None = None) -> None:
+        self.solver, self._view, self._folder = solver or Solver(), view, folder
+        self.state, self._changed = state, time.monotonic()
+        self.long_model = "foundation"
+        self.long_on_release = False
+        self.shown: Shown | None = None
+        self._long: LongPress | None = None
+        self._long_state = state
+        self._long_of: tuple[State, PressResult] | None = None
+        self._wanted: State | None = None           # for a long press
+        self._stop_long = False
+        self.held = False
+        """Whether the mouse holds the object."""
+        self._refused: State | None = None
+        self._recording: list[tuple[float, State]] | None = None
+        self._recorded: list[tuple[float, State]] = []
+        self._lock, self._wake, self._closed = threading.RLock(), threading.Event(), threading.Event()
+        self._preparing: set[str] = set()
+
+    def start(self) -> None:
+        """Start the thread that computes."""
+        threading.Thread(target=self._work, daemon=True, name="softtact play").start()
+
+    def close(self) -> None:
+        """End the thread, and a long press with it."""
+        self._closed.set()
+        self._wake.set()
+
+    def change(self, *, held: bool | None = None, **fields: Any) -> None:
+        """Change fields of the state; held: whether a mouse button holds the object from now on."""
+        with self._lock:
+            state = replace(self.state, **fields)
+            self.held = self.held if held is None else held
+            if state != self.state or held is not None:
+                self.state, self._changed = state, time.monotonic()
+            if self._recording is not None:
+                self._note(self._recording)
+        self._wake.set()
+
+    def run_long(self, model: str) -> None:
+        """Press the present state with a long model."""
+        if model not in LONG_MODELS:
+            raise InputError(f"The model {model!r} is unknown; use one of {', '.join(LONG_MODELS)}.")
+        with self._lock:
+            self.long_model, self._wanted = model, self.state
+        self._wake.set()
+
+    def abandon_long(self) -> None:
+        """End the long press that runs."""
+        with self._lock:
+            self._stop_long, self._wanted = True, None
+        self._wake.set()
+
+    # --- recording ---
+
+    @property
+    def recording(self) -> bool:
+        """Whether states are recorded."""
+        return self._recording is not None
+
+    def record(self) -> bool:
+        """Begin to record states, or end it; return whether it records now."""
+        with self._lock:
+            if self._recording is None:
+                self._recording = [(time.monotonic(), self.state)]
+            else:
+                self._note(self._recording)
+                self._recorded, self._recording = self._recording, None
+            return self.recording
+
+    def _note(self, recording):
+        now = time.monotonic()
+        if now - recording[0][0] <= _LONGEST_S:
+            recording.append((now, self.state))
+
+    def replay(self) -> None:
+        """Play the recording in real time, in a thread of its own."""
+        self._aside(self._replay)
+
+    def _replay(self):
+        recorded = self._need_recording()
+        for (before, _), (now, state) in zip([recorded[0], *recorded], recorded, strict=False):
+            if self._closed.wait(now - before):
+                return
+            self.change(**vars(state))
+
+    def save_movie(self) -> None:
+        """Write the recording as MP4, in a thread of its own."""
+        self._aside(lambda: self._view.tell(f"Saved {self._folder.save_movie(self._frames(self._need_recording()))}."))
+
+    def _need_recording(self):
+        if not self._recorded:
+            raise InputError("There is no recording; press Record, move the object, and press it again.")
+        return self._recorded
+
+    def _frames(self, recorded: list[tuple[float, State]]) -> Iterator[np.ndarray]:
+        """Pictures of a recording at `FPS`, all as large as the first."""
+        solver, times = Solver(), np.array([moment for moment, _ in recorded])
+        moments = np.arange(times[0], times[-1] + 1 / FPS, 1 / FPS)
+        shape, last, frame = None, None, None
+        for number, moment in enumerate(moments):
+            if self._closed.is_set():
+                raise InputError("The tab was closed while its movie was written; record again.")
+            state = recorded[int(np.searchsorted(times, moment, side="right")) - 1][1]
+            if frame is None or state != last:
+                shown = solver.solve(state, draft=True)
+                frame, last = board(shown.result, shown.clearance_mm), state
+                shape = shape or frame.shape
+                frame = _fitted(frame, shape)
+            if number % int(FPS) == 0:
+                self._view.tell(f"Writing the movie: {number} of {len(moments)} frames.")
+            yield frame
+
+    # --- saving ---
+
+    def save(self) -> None:
+        """Save the present press as NetCDF and PNG, and its command line and Python lines, in a thread of its own."""
+        self._aside(self._save)
+
+    def _save(self):
+        state = self.state
+        shown = self.shown if self.shown and self.shown.state == state and not self.shown.draft else Solver().solve(state)
+        also = self._long_of[1] if self._long_of and self._long_of[0] == state else None
+        files = self._folder.save_press(shown.press, shown.result, also)
+        self._view.tell("Saved " + ", ".join(map(str, files)) + ".")
+
+    def _aside(self, work: Callable[[], None]) -> None:
+        """Do work in a thread; what it refuses is told."""
+        threading.Thread(target=lambda: self._guarded(work, self._view.tell), daemon=True).start()
+
+    # --- the thread that computes ---
+
+    def _work(self):
+        try:
+            while not self._closed.is_set():
+                self._guarded(self._next_press, self._view.refuse)
+                self._guarded(self._next_look, lambda sentence: self._view.show_long(sentence, None, None))
+                if self._is_idle():
+                    self._wake.wait(_LOOK_S)
+                self._wake.clear()
+        finally:
+            self._end_long()
+
+    def _guarded(self, work, refuse):
+        """Do work; an error becomes a sentence, so that the page lives on."""
+        try:
+            work()
+        except SofttactError as error:
+            refuse(str(error))
+        except Exception as error:     # a fault of this program: the terminal gets its place
+            traceback.print_exc(file=sys.stderr)
+            refuse(f"This press failed with an unexpected {type(error).__name__} ({error}); the terminal shows where.")
+
+    def _is_idle(self):
+        return self.state in (self._refused, self.shown.state if self.shown else None)
+
+    def _next_press(self):
+        """Press the newest state, coarse if it just changed; or the whole map of one that rests."""
+        with self._lock:
+            state, rests = self.state, not self.held and time.monotonic() - self._changed > _RESTS_S
+        if state == self._refused:
+            return
+        try:
+            new = self.shown is None or self.shown.state != state
+            if not new and not (rests and self.shown.draft and self._is_prepared(state.sensor)):
+                return
+            self._publish(self.solver.solve(state, draft=new))
+        except BaseException:
+            self._refused = state
+            raise
+        if not self.shown.draft and self.long_on_release and self._long is None:
+            with self._lock:
+                self._wanted = state
+
+    def _publish(self, shown):
+        self.shown, self._refused = shown, None
+        self._view.show(shown)
+
+    def _is_prepared(self, name):
+        """Whether the whole map's compliance is there; else it is prepared in a thread, once."""
+        sensor = self.solver.sensor(name)
+        if "elastic" in sensor.prepared_models:
+            return True
+        if name not in self._preparing:
+            self._preparing.add(name)
+            self._aside(lambda: sensor.prepared("elastic"))
+        return False
+
+    def _next_look(self):
+        """Start, end or look at the long press."""
+        with self._lock:
+            wanted, stop, self._stop_long = self._wanted, self._stop_long, False
+            if wanted is not None and self._long is None:
+                self._wanted = None
+        if stop and self._long is not None:
+            self._end_long()
+            self._view.show_long("Abandoned.", None, None)
+        if self._long is None:
+            if wanted is not None:
+                self._start_long(wanted)
+            return
+        if self._long.running:
+            self._view.show_long(f"{self._long.press.model}, {self._long.seconds:.0f} s: {self._long.progress}", None, None)
+            return
+        state, long = self._long_state, self._long
+        try:
+            result = long.result()
+            self._long_of = state, result
+            self._view.show_long(f"{result.model}, {long.seconds:.0f} s", result, self.solver.solve(state))
+        finally:
+            self._end_long()
+
+    def _start_long(self, state):
+        press = self.long_press(state)
+        self._long, self._long_state = LongPress(press, self._folder.path), state
+        self._view.show_long(f"{press.model}: starting", None, None)
+
+    def long_press(self, state: State) -> Press:
+        """The press of a state by the long model that is chosen: with slide and twist as a motion where that model follows it."""
+        shown = self.shown if self.shown and self.shown.state == state else self.solver.solve(state, draft=True)
+        if not state.moves or self.long_model == "foundation" or isinstance(shown.press.load, str):
+            return replace(shown.press, model=self.long_model)
+        pose = state.pose(self.solver.mesh(state.object), moved=False)
+        return replace(shown.press, model=self.long_model, pose=pose, load=state.motion(shown.press.load))
+
+    def _end_long(self):
+        if self._long is not None:
+            self._long.close()
+            self._long = None
+
+
+def _fitted(frame, shape):
+    """A picture cut or padded with white to a shape."""
+    out = np.full(shape, 255, dtype=np.uint8)
+    rows, columns = min(frame.shape[0], shape[0]), min(frame.shape[1], shape[1])
+    out[:rows, :columns] = frame[:rows, :columns]
+    return out

@@ -1,0 +1,114 @@
+"""The server of the page: on this machine alone, nothing from elsewhere, no tunnel, no other site; and the page in Chromium."""
+
+import io
+import re
+import shutil
+import socket
+import time
+import urllib.request
+
+import numpy as np
+import pytest
+from PIL import Image
+from support.chromium import Chromium
+
+viser = pytest.importorskip("viser")
+from viser import _messages  # noqa: E402
+from websockets.exceptions import ConnectionClosed  # noqa: E402
+from websockets.sync.client import connect  # noqa: E402
+
+from softtact.cli import main  # noqa: E402
+from softtact.play.server import PlayServer, _limit_uploads  # noqa: E402
+
+needs_browser = pytest.mark.skipif(not shutil.which("chromium"), reason="Chromium is not installed")
+
+
+@pytest.fixture
+def server(state, folder, tmp_path):
+    """One that serves the ball on the small sensor."""
+    one = PlayServer(state, {"ball": state.object}, [state.sensor, str(folder / "gel.yaml")], tmp_path / "out", port=0)
+    yield one
+    one.stop()
+
+
+def test_the_page_is_served_to_this_machine_alone_and_loads_nothing_from_elsewhere(server):
+    with urllib.request.urlopen(server.url) as answer:
+        page = answer.read().decode()
+    assert set(re.findall(r"https?://[\w./-]+", page)) <= {"http://www.w3.org/2000/svg"}      # a name space, no address
+    others = {entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
+    for address in others | {"127.0.0.2"}:
+        with pytest.raises(OSError):
+            socket.create_connection((address, server.port), timeout=1).close()
+
+
+def test_no_tunnel_can_be_asked_for(server):
+    handlers = server._server._websock_server._incoming_handlers
+    assert _messages.ShareUrlRequest not in handlers and _messages.ShareUrlDisconnect not in handlers
+
+
+@pytest.mark.parametrize("origin, stays", [("http://elsewhere.example", False), (None, True), ("own", True)])
+def test_a_page_of_another_site_gets_no_connection(server, origin, stays):
+    address = server.url.replace("http", "ws")
+    with connect(address, origin=server.url if origin == "own" else origin, max_size=None,
+                 subprotocols=[f"viser-v{viser.__version__}"]) as socket_:
+        if stays:
+            socket_.recv(timeout=10)
+        else:
+            with pytest.raises(ConnectionClosed) as closed:
+                for _ in range(100):
+                    socket_.recv(timeout=10)
+            assert closed.value.rcvd.code == 1008
+
+
+def test_an_upload_over_the_limit_is_not_taken_into_memory(monkeypatch):
+    monkeypatch.setenv("SOFTTACT_LIMITS", "0.00001")      # 3 kB
+    started, handlers, told = [], {}, []
+
+    class Client:
+        class gui:
+            _current_file_upload_states = {"an earlier one": {}}
+            _handle_file_transfer_start = staticmethod(lambda number, message: started.append(message.size_bytes))
+
+            class _websock_interface:
+                unregister_handler = staticmethod(lambda kind: None)
+                register_handler = staticmethod(handlers.__setitem__)
+
+        add_notification = staticmethod(lambda title, body, **_: told.append(body))
+
+    _limit_uploads(Client)
+    for size in (5000, 2000):
+        handlers[_messages.FileTransferStartUpload](0, _messages.FileTransferStartUpload("button", "id", "part.stl", "", 1, size))
+    assert started == [2000] and "part.stl" in told[0] and not Client.gui._current_file_upload_states
+
+
+def test_what_cannot_be_played_is_refused_before_the_server_starts(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken.stl").write_bytes(b"solid nothing")
+    for arguments, words in ((["--port", "99999"], "--port 99999"), (["broken.stl", "--unit", "mm"], "broken.stl"),
+                             (["--sensor", "nowhere"], "no sensor"), (["--out", "broken.stl"], "broken.stl")):
+        assert main(["play", "--no-open", *arguments]) == 1
+        assert words in capsys.readouterr().err
+
+
+@needs_browser
+@pytest.mark.slow
+def test_two_tabs_press_by_keys_and_each_has_its_own_press(server):
+    with Chromium(server.url) as one, Chromium(server.url, width=400, height=800) as other:
+        for tab in (one, other):
+            tab.wait_for_text("whole")
+        for _ in range(4):
+            one.key("L")
+        one.wait_for_text("--pose=-1,2,")
+        assert "--pose=-3,2," in other.text
+        picture = np.asarray(Image.open(io.BytesIO(one.screenshot())).convert("RGB")).astype(int)
+        scene = picture[100:, :900]
+        assert (np.abs(scene - 255).sum(axis=2) > 60).mean() > 0.05      # the sensor and the object are drawn
+        assert all(url.startswith((server.url, "data:", f"blob:{server.url}")) for url in one.asked_for)
+        one.click("Save press")
+        one.wait_for_text("Saved ")
+        assert len(server.pages) == 2
+    for _ in range(100):
+        if not server.pages:
+            return
+        time.sleep(0.1)
+    pytest.fail("the closed tabs are still there")
