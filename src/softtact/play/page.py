@@ -102,7 +102,7 @@ class Page:
             self._unit = gui.add_dropdown("unit of a file", ("of the file", *UNITS), initial_value="mm",
                                           hint="STL, OBJ, PLY and OFF files do not state their unit")
             self._upload = gui.add_upload_button("Take a mesh file", icon=viser.Icon.UPLOAD,
-                                                 mime_type=".stl,.obj,.ply,.off,.3mf,.amf,.glb,.step,.stp,.zip")
+                                                 mime_type=".stl,.obj,.ply,.off,.3mf,.amf,.dae,.glb,.step,.stp,.zip")
         with gui.add_folder("Place", expand_by_default=False):
             self._place = gui.add_vector2("x, y, mm", (0.0, 0.0), step=0.1)
             self._turn = gui.add_vector3("turn, deg", (0.0, 0.0, 0.0), step=1.0)
