@@ -207,3 +207,58 @@ def test_a_wrong_reading_beyond_16_bits_is_told_by_its_taxel_and_not_as_another_
     (tmp_path / "r.csv").write_text("\n".join([*lines, ""]))
     found, = check_recording(read_recording(tmp_path / "r.csv"))
     assert "row 104: finger 0, taxel 5 (row 1, column 1) reads -30000 counts" in found.sentence
+
+
+def test_a_wrong_value_of_many_rows_is_left_out():
+    bench = ramp()
+    bench.counts[140:148, 0, 3, 1] = 30000
+    found, = told(bench, "wrong reading")
+    assert "row 140: finger 0, taxel 13 (row 3, column 1) reads 30000 counts" in found.sentence
+    assert np.flatnonzero(found.left_out[:, 0, 3, 1]).tolist() == list(range(140, 148))
+
+
+def test_a_frame_of_raw_zeros_is_left_out():
+    bench = ramp()
+    bench.counts[30, 0] = -9000
+    found, = told(bench, "wrong reading")
+    assert "row 30: the whole frame of finger 0" in found.sentence
+
+
+def test_zeros_for_a_while_amid_a_press_are_frozen():
+    bench = ramp()
+    bench.counts[150:210] = 0
+    found = told(bench, "frozen")
+    assert "press.csv, rows 150 to 209: 60 readings" in found[0].sentence
+
+
+def test_a_taxel_that_gives_noise_only_is_dead():
+    bench = ramp()
+    bench.counts[:, 0, 2, 2] = np.random.default_rng(2).integers(0, 2, len(bench.counts))
+    found, = told(bench, "dead")
+    assert "finger 0, taxel 10 (row 2, column 2) changes by 1 counts, its noise, in all 400 readings" in found.sentence
+
+
+@pytest.mark.parametrize(("log", "sentence"), [
+    (lambda n: np.where((np.arange(len(n)) > 150) & (np.arange(len(n)) < 260), n[150], n), "it reads "),
+    (lambda n: np.minimum(n, 15.0), "it reads 15 N from 1.6"),
+], ids=["frozen", "at its end"])
+def test_readings_while_the_log_stands_still_are_left_out(log, sentence):
+    bench = ramp()
+    bench.log_n = log(bench.log_n)
+    found, = told(bench, "standing log")
+    assert sentence in found.sentence and "while the counts of finger 0 change by" in found.sentence and found.safe
+    assert found.left_out[200, 0].all() and not found.left_out[100, 0].any()
+
+
+def test_creep_under_a_force_that_is_held_without_noise_is_no_standing_log():
+    bench = ramp()
+    held = np.interp(bench.time_s, [0.5, 1.0, 3.0, 3.5], [0, 20, 20, 0])
+    bench.log_n = np.interp(bench.log_s, bench.time_s, held)
+    creep = 1 + 0.15 * (1 - np.exp(-np.maximum(bench.time_s - 1.0, 0) / 0.8))
+    bench.counts[:, 0] = np.round(30 * held * creep)[:, None, None]
+    assert "standing log" not in {one.check for one in check_recording(bench.recording())}
+
+
+def test_a_clock_that_never_moves_is_refused():
+    with pytest.raises(InputError, match="rows 0 to 39: all have the time 5 ms"):
+        running_forward("r.csv", np.full(40, 5.0), range(40), unit="ms")

@@ -57,8 +57,14 @@ def check_recordings(problem: Problem) -> list[PressCheck]:
 
 
 def check_result(result: CalibrationResult) -> None:
-    """Raises InputError if a fitted number is at a bound of its range."""
+    """Raises InputError if a fitted number is at a bound of its range, or a taxel does not follow the presses."""
     problem = result.problem
+    gain = result.linear.gain / result.linear.scale
+    if gain.min() <= 0:
+        row, column = np.unravel_index(int(gain.argmin()), gain.shape)
+        names = ", ".join(one.name for one in problem.experiments)
+        raise InputError(f"{names}: taxel {row * gain.shape[1] + column} (row {row}, column {column}) does not follow the press "
+                         f"(its gain would be {gain.min():.2g} of the common one); check the taxel.")
     low, high = problem.bounds
     for name, value, least, most in zip(problem.names, result.vector, low, high, strict=True):
         if name == "ln modulus" and min(value - least, most - value) < _AT_BOUND:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.optimize import nnls
 
 from softtact.errors import InputError
@@ -44,6 +45,10 @@ _PRELOAD = (0.05, 0.3)          # of the stress at `_START`: with an unstrained 
 _SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of these against that over the last two
 # Of the greatest stress before, of the greatest of all, and of the noise: a larger fall of the stress is a break.
 _BREAK = (0.1, 0.03, 6.0)
+_AROUND = 5                     # rows whose median tells what a row should be
+_ALONE = (1.0, 0.1)             # least distance from it of a wrong row: over it, and over the greatest of all
+# Fewest rows at one greatest stress, least share of the strains, and least change before them over the smallest step of the stress.
+_STANDS = (8, 0.05, 5.0)
 _SLACK = 0.5                    # their ratio; in twelve published curves it is 0.7 and more
 
 
@@ -63,7 +68,41 @@ def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *,
         if inside.sum() > 2:
             rows, x, y = rows[inside], x[inside], y[inside]
     found = _of_volume(x) if mode == VOLUMETRIC else remarks(x, y, mode=mode, compression=compression)
-    return tuple(f"{path}: {remark}" for remark in (*found, *_break(rows, x, y, mode)))
+    sound, alone = _rows_alone(rows, x, y, mode)
+    found = (*found, *alone, *_break(rows[sound], x[sound], y[sound], mode), *_standing(rows[sound], x[sound], y[sound], mode))
+    return tuple(f"{path}: {remark}" for remark in found)
+
+
+def _rows_alone(rows, x, y, mode):
+    """Mask (n,) of the rows that are no wrong single ones, and the remark on these, in a tuple that is empty without any."""
+    order = np.argsort(x - rest_of(mode), kind="stable")
+    usual = median_filter(y[order], size=_AROUND, mode="nearest")
+    wrong = np.abs(y[order] - usual) > np.maximum(_ALONE[0] * np.abs(usual), _ALONE[1] * np.abs(usual).max())
+    sound = np.ones(len(x), dtype=bool)
+    sound[order] = ~wrong
+    if not wrong.any() or wrong.sum() > len(x) // _AROUND:
+        return np.ones(len(x), dtype=bool), ()
+    first = int(np.flatnonzero(~sound)[0])
+    more = f", and {wrong.sum() - 1} more such rows" if wrong.sum() > 1 else ""
+    return sound, (f"row {rows[first]}: the stress {y[first]:.4g} MPa stands alone between rows of about "
+                   f"{usual[int(np.flatnonzero(order == first)[0])]:.4g} MPa{more}; correct or remove it",)
+
+
+def _standing(rows, x, y, mode):
+    """The remark on a largest stress that stands while the strain grows to its end, in a tuple that is empty otherwise."""
+    strain = np.abs(x - rest_of(mode))
+    at = np.argsort(strain, kind="stable")
+    strain, stress = strain[at], np.abs(y[at])
+    steps = np.diff(stress)
+    count = len(stress) - 1 - int(np.flatnonzero(steps)[-1]) if steps.any() else 0
+    if count < _STANDS[0] or stress[-1] < stress.max():
+        return ()
+    first, span = len(stress) - count, strain[-1] - strain[-count]
+    before = np.interp(strain[first] - span, strain[:first], stress[:first])
+    if span < _STANDS[1] * np.ptp(strain) or stress[-1] - before < _STANDS[2] * np.abs(steps[steps != 0]).min():
+        return ()
+    return (f"from row {rows[at[first]]} on its stress stands at {stress[-1]:.4g} MPa while the strain grows, as at the end of a load "
+            "cell's range; leave these rows out, or state the window before them",)
 
 
 def _break(rows, x, y, mode):

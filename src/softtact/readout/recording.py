@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import maximum_filter, rank_filter, uniform_filter1d
 
 from softtact.errors import InputError
 from softtact.readout.frames import noise
@@ -29,6 +29,8 @@ TAXELS = ROWS * COLUMNS
 LARGEST_RAW = 65535                 # of the 16 bits of a taxel
 AXES = ("x", "y", "z")
 MOVES = 30.0                        # counts: least change of a pressed finger; five standard deviations of the virtual noise
+_SLOW, _DEAF = 15, 0.02             # readings of a mean; its change over that of two taxels beside it, less than a press spreads
+_AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
 NOISY = 1.0                         # counts: noise that is no rounding, so that a taxel, or a frame, does not stand by chance
 _LATE_S = 0.05                      # by which a log of forces may begin late or end early: a few rows of the log
 _GAP, _GAP_S = 6.0, 0.1             # a gap in a log: times the usual distance of its rows, and s
@@ -103,13 +105,19 @@ def clipped(recording: "xarray.Dataset", *, largest: float | None = None) -> np.
 
 
 def dead(recording: "xarray.Dataset") -> np.ndarray:
-    """Taxels (finger, row, column) that never change while one beside them is pressed, or most of a pressed finger are noisy."""
+    """Taxels (finger, row, column) that never change while one beside them is pressed, or most of a pressed finger are noisy.
+
+    Also those that change by noise only while two beside them are pressed.
+    """
     moved = np.ptp(recording.counts.values, axis=0)
     beside = maximum_filter(moved, size=(1, 3, 3), mode="constant")
     noises = noise(recording.counts.values.reshape(len(recording.time), -1)).reshape(moved.shape)
     noisy = np.median(noises, axis=(1, 2), keepdims=True) >= NOISY
     pressed = moved.max(axis=(1, 2), keepdims=True) >= MOVES
-    return (moved == 0) & pressed & ((beside >= MOVES) | noisy)
+    slow = np.ptp(uniform_filter1d(recording.counts.values.astype(float), _SLOW, axis=0), axis=0)
+    second = rank_filter(slow, -2, footprint=_AROUND[None], mode="constant")
+    deaf = (slow < _DEAF * second) & (second >= 5 * MOVES)
+    return (moved == 0) & pressed & ((beside >= MOVES) | noisy) | deaf
 
 
 def name_of(recording: "xarray.Dataset") -> str:
@@ -190,10 +198,13 @@ def running_forward(path: Path, time: np.ndarray, rows: Sequence[int], *, unit: 
     with the file's row, for other steps back: they are of two recordings in one file.
     """
     time, told = np.array(time, dtype=float), []
+    if len(time) >= _ROWS_OF_A_CLOCK and np.ptp(time) == 0:
+        raise InputError(f"{path}, rows {rows[0]} to {rows[-1]}: all have the time {time[0]:.15g} {unit}; record again with the "
+                         "clock running.")
     for at in map(int, np.flatnonzero(np.diff(time) < 0)):
         before, after = time[at], time[at + 1]
         steps = np.diff(time)
-        usual = float(np.median(steps[steps > 0])) if len(time) >= _ROWS_OF_A_CLOCK else 0.0
+        usual = float(np.median(steps[steps > 0])) if len(time) >= _ROWS_OF_A_CLOCK and (steps > 0).any() else 0.0
         where, back = f"{path}, row {rows[at + 1]}", before - after
         wrap = next((one for one in _WRAPS_MS if unit == "ms" and before < one and 0 <= one - back <= _WRAP_STEPS * usual), None)
         if wrap is not None:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from softtact.readout.checks.finding import Finding, taxels_of, where
-from softtact.readout.frames import new_frames, noise
+from softtact.readout.frames import Runs, new_frames, noise
 from softtact.readout.recording import MOVES, name_of, row_of
 
 if TYPE_CHECKING:
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _REST_S, _FEWEST = 0.1, 5     # least duration and number of readings of a rest
 _ZERO = 0.01                  # of the range: forces and counts that count as zero
+_STANDS_S = 0.25              # least duration for which a log stands at one force
+_CHANGES, _RETURNS = 0.2, 0.05     # of the counts' range: change while the log stands, and back again, that is no creep
 _CELL_DRIFTS = 0.02           # of the range of forces: change of a load cell's zero
 _DRIFTS, _DRIFTS_COUNTS = 0.02, 3.0    # least drift: of the counts of a press, and counts
 _GRIPPER_N = 235.0            # largest force of the maker's gripper 2F-85
@@ -97,6 +99,29 @@ def gaps(recording: "xarray.Dataset") -> Iterator[Finding]:
                           f"{recording.attrs['force_spacing_s']:.3g} s apart); a calibration leaves out what "
                           f"{name_of(recording)} has in between, rows {rows}: give the whole log.",
                           tuple(range(recording.sizes["finger"])), left_out=spoiled)
+
+
+def standing_log(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:
+    """Times for which the log stands at one force while the counts change by more than creep: it is frozen, or at its end."""
+    for finger in range(recording.sizes["finger"]):
+        press = _Press.of(recording, finger, spoiled)
+        if press is None:
+            continue
+        level, span = _smooth(press.level), np.ptp(press.level)
+        runs = Runs.of(press.force_n)
+        for first, count in zip(runs.first, runs.length, strict=True):
+            run = slice(first, first + count)
+            change, kept = np.ptp(level[run]), abs(level[first] - level[first + count - 1])
+            changes = change > max(_CHANGES * span, 10 * press.noise) or change - kept > max(_RETURNS * span, 10 * press.noise)
+            if count < _FEWEST or np.ptp(press.time_s[run]) < _STANDS_S or not changes:
+                continue
+            begin, end = press.rows[first], press.rows[first + count - 1]
+            left_out = np.zeros(recording.counts.shape, dtype=bool)
+            left_out[begin:end + 1, finger] = True
+            yield Finding("standing log", f"{recording.attrs['force_log']}: it reads {press.force_n[first]:.4g} N from "
+                          f"{recording.time.values[begin]:.4g} to {recording.time.values[end]:.4g} s while the counts of finger "
+                          f"{finger} change by {change / span:.0%} of the press; a calibration leaves these readings out: check "
+                          "the load cell's program and its range.", (finger,), left_out=left_out)
 
 
 def load_cell_zero(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[Finding]:

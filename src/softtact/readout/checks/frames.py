@@ -20,6 +20,8 @@ _SPIKE, _SPIKE_COUNTS = 15.0, 40.0    # least distance of a wrong reading from t
 _SPREAD = 0.1                         # of a taxel's jump that its neighbours share when it is touched, through cover and filler
 _TOGETHER = 0.25                      # share of a finger's taxels above which they jump as a frame
 _BEYOND = 10_000.0                    # counts: a jump of many taxels that no press makes
+_TIMES, _LARGE = 3.0, 1000.0          # a wrong reading of any duration: least size over the largest of other taxels, and counts
+_FEW_TAXELS = 3                       # that may read wrong values at once
 _HANGS = 10                           # fewest frames of a taxel that hangs
 _DRIFTS_COUNTS, _ALIKE = 20.0, 0.02   # drift without forces: least counts, and scatter over all taxels, less than that of gains
 _CHANCE = 1e-9                        # probability below which a run of equal values is no chance
@@ -33,21 +35,40 @@ def wrong_readings(recording: "xarray.Dataset") -> Iterator[Finding]:
         if len(runs.first) < _FEWEST:
             continue
         brief = runs.length <= 2 * runs.usual      # what stands for longer is a rest or a hold
-        single, whole = _wrong(counts[runs.first], _impossible(recording, finger)[runs.first], brief)
+        frames, raw = counts[runs.first], _raw(recording, finger)[runs.first]
+        single, whole = _wrong(frames, raw, brief, baseline=recording.baseline.values.any())
+        single |= _beyond_all(frames) & (raw < LARGEST_RAW) & ~whole[:, None]
         for number in np.flatnonzero(single.any(axis=0)):
             yield _wrong_taxel(recording, finger, number, runs, np.flatnonzero(single[:, number]))
         if whole.any():
             yield _wrong_frame(recording, finger, runs, np.flatnonzero(whole))
 
 
-def _impossible(recording, finger):
-    """Readings (time, taxel) that 16 bits do not hold."""
-    raw = taxels_of(recording, finger) + recording.baseline.values[finger].ravel()
-    return (raw < 0) | (raw > LARGEST_RAW) if recording.baseline.values.any() else np.zeros(raw.shape, dtype=bool)
+def _raw(recording, finger):
+    """Raw counts (time, taxel) of a finger."""
+    return taxels_of(recording, finger) + recording.baseline.values[finger].ravel()
 
 
-def _wrong(frames, impossible, brief):
-    """Wrong readings (n, taxel), and wrong frames (n,), of distinct frames (n, taxel), among those that are `brief` (n,)."""
+def _beyond_all(frames):
+    """Readings (n, taxel) far larger than those of other taxels, which no neighbour shares: no press, however long they last.
+
+    Those of a taxel that hangs are not among them.
+    """
+    size = np.abs(frames)
+    usual = np.sort(size.max(axis=0))[-1 - _FEW_TAXELS]
+    found = (size > max(_TIMES * usual, _LARGE)) & _alone(frames)
+    for number in np.flatnonzero(found.any(axis=0)):
+        length = Runs.of(frames[:, number]).length
+        found[:, number] &= np.repeat(length, length) < _HANGS
+    return found
+
+
+def _wrong(frames, raw, brief, *, baseline):
+    """Wrong readings (n, taxel), and wrong frames (n,), of distinct frames (n, taxel), among those that are `brief` (n,).
+
+    raw (n, taxel): the raw counts;  baseline: whether they are known, so that 16 bits must hold them
+    """
+    impossible = ((raw < 0) | (raw > LARGEST_RAW)) & baseline
     off, usual = deviations(frames)
     noises = noise(frames)
     far = np.abs(off) > np.maximum(_SPIKE * np.maximum(usual, noises), _SPIKE_COUNTS)
@@ -55,7 +76,7 @@ def _wrong(frames, impossible, brief):
     count = odd.sum(axis=1)
     upwards = (odd & (off > 0)).sum(axis=1) / np.maximum(count, 1)
     beyond = np.median(np.abs(off), axis=1) > _BEYOND
-    blank = (frames == 0).all(axis=1) & (np.median(noises) >= NOISY) & (count > 0)
+    blank = ((frames == 0).all(axis=1) | (raw == 0).all(axis=1)) & (np.median(noises) >= NOISY) & (count > 0)
     together = count > _TOGETHER * frames.shape[1]
     whole = blank | (together & (((upwards > 0.25) & (upwards < 0.75)) | beyond))
     return odd & (impossible | (_alone(off) & ~together[:, None])) & ~whole[:, None], whole
@@ -102,9 +123,10 @@ def clipped_taxels(recording: "xarray.Dataset", spoiled: np.ndarray, largest: fl
 def dead_taxels(recording: "xarray.Dataset") -> Iterator[Finding]:
     """Taxels that never change while others of their finger do."""
     for finger, row, column in np.argwhere(dead(recording)):
-        yield Finding("dead", f"{where(recording, 0)}: {taxel_in_words(finger, row, column)} reads "
-                      f"{recording.counts.values[0, finger, row, column]:g} counts in all {len(recording.time)} readings while "
-                      "others of its finger move; it may be dead.", (int(finger),),
+        values = recording.counts.values[:, finger, row, column]
+        reads = f"reads {values[0]:g} counts" if np.ptp(values) == 0 else f"changes by {np.ptp(values):g} counts, its noise,"
+        yield Finding("dead", f"{where(recording, 0)}: {taxel_in_words(finger, row, column)} {reads} in all "
+                      f"{len(recording.time)} readings while others of its finger move; it may be dead.", (int(finger),),
                       left_out=readings(recording, finger, slice(None), row * COLUMNS + column))
 
 
@@ -140,7 +162,8 @@ def _still(recording, finger):
         around = np.concatenate([counts[max(0, first - reach):first + 1], counts[last + 1:last + 1 + reach]])
         noises = noise(around)
         jumps = last + 1 < len(counts) and (np.abs(counts[last + 1] - counts[last]) > 10 * noises + MOVES).any()
-        pressed = np.abs(counts[first]).max() > MOVES
+        sides = counts[[first - 1, last + 1]] if 0 < first and last + 1 < len(counts) else counts[[first, first]]
+        pressed = np.abs(counts[first]).max() > MOVES or np.abs(sides).max(axis=1).min() > MOVES     # zeros amid a press
         moved = np.ptp(force[first:last + 2 - runs.usual]) > _FORCE_MOVES * np.ptp(force)
         if (jumps and pressed and moved) or (counts[first].any() and np.median(noises) >= NOISY):
             yield int(first), int(last)

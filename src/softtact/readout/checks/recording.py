@@ -33,6 +33,7 @@ def check_recording(recording: "xarray.Dataset", *, largest: float | None = None
 def _of_forces(recording, of_counts):
     """Findings in the forces; each later check relies on what the earlier ones found sound."""
     found = list(forces.gaps(recording))
+    found += forces.standing_log(recording, left_out(recording, [*of_counts, *found]))
     spoiled = left_out(recording, [*of_counts, *found])
     found += forces.load_cell_zero(recording, spoiled)
     recording = zeroed(recording, found)
