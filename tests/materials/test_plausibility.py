@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.materials.checks import remarks
+from softtact.materials.checks import checked, remarks
 from softtact.materials.readers import order, read_curves
 
 MU = 0.35
@@ -123,3 +123,28 @@ def test_loading_and_unloading_are_told_apart_by_the_order_of_the_rows(strain, s
 def test_rows_that_are_no_cycle_are_sorted(strain):
     x, y = order("file.csv", np.arange(len(strain)), 1 + strain, 2 * strain, mode="uniaxial", sort=True)
     assert (np.diff(x) >= 0).all() and y == pytest.approx(2 * (x - 1))
+
+
+def of_rows(stretch, stress):
+    """The remarks on a curve with the numbers of its rows from 2 on."""
+    return checked("c.csv", np.arange(2, 2 + len(stretch)), stretch, stress, mode="uniaxial", raw=np.stack([stretch, stress]),
+                   compression=False)
+
+
+@pytest.mark.parametrize("sign", [1, -1], ids=["tension", "compression"])
+@pytest.mark.parametrize("factor", [10.0, 0.0])
+def test_a_row_that_stands_alone_is_told_and_is_no_break(factor, sign):
+    stretch = 1 + sign * 0.6 * STRAIN
+    stress = rubber(stretch)
+    stress[30] *= factor
+    remark, = of_rows(stretch, stress)
+    assert f"c.csv: row 32: the stress {stress[30]:.4g} MPa stands alone between rows of about" in remark
+
+
+def test_a_stress_that_stands_at_its_largest_value_to_the_end_is_told():
+    stress = rubber(1 + STRAIN)
+    remark, = of_rows(1 + STRAIN, np.minimum(stress, stress[35]))
+    assert f"c.csv: from row 37 on its stress stands at {stress[35]:.4g} MPa while the strain grows" in remark
+    assert of_rows(1 + STRAIN, stress.round(2)) == of_rows(1 + STRAIN[::10], stress[::10]) == ()
+    plateau = 0.4 * (1 - np.exp(-6 * STRAIN))
+    assert not any("stands at" in one for one in of_rows(1 + STRAIN, plateau.round(2)))

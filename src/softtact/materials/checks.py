@@ -46,7 +46,7 @@ _SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of 
 # Of the greatest stress before, of the greatest of all, and of the noise: a larger fall of the stress is a break.
 _BREAK = (0.1, 0.03, 6.0)
 _AROUND = 5                     # rows whose median tells what a row should be
-_ALONE = (1.0, 0.1)             # least distance from it of a wrong row: over it, and over the greatest of all
+_ALONE = (0.5, 0.1)             # least distance from it of a wrong row: over it, and over the greatest of all
 # Fewest rows at one greatest stress, least share of the strains, and least change before them over the smallest step of the stress.
 _STANDS = (8, 0.05, 5.0)
 _SLACK = 0.5                    # their ratio; in twelve published curves it is 0.7 and more
@@ -101,8 +101,8 @@ def _standing(rows, x, y, mode):
     before = np.interp(strain[first] - span, strain[:first], stress[:first])
     if span < _STANDS[1] * np.ptp(strain) or stress[-1] - before < _STANDS[2] * np.abs(steps[steps != 0]).min():
         return ()
-    return (f"from row {rows[at[first]]} on its stress stands at {stress[-1]:.4g} MPa while the strain grows, as at the end of a load "
-            "cell's range; leave these rows out, or state the window before them",)
+    return (f"from row {rows[at[first]]} on its stress stands at {stress[-1]:.4g} MPa while the strain grows, as at the end of a "
+            "load cell's range; leave these rows out, or state the window before them",)
 
 
 def _break(rows, x, y, mode):
