@@ -72,7 +72,7 @@ def test_only_an_arruda_boyce_law_is_written_with_a_logarithmic_volumetric_funct
 def test_every_law_of_ours_has_its_card_and_another_is_refused():
     assert set(CONSTANTS) == set(LAWS) - {"gent"}    # neither program has it
     with pytest.raises(InputError, match="'gent' cannot be written for Abaqus; use one of neo_hooke"):
-        law_card(SimpleNamespace(name="gent"), no_term=0.0, dialect="Abaqus")
+        law_card(SimpleNamespace(name="gent", inelastic=None), no_term=0.0, dialect="Abaqus")
 
 
 @needs_ccx
