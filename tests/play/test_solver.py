@@ -1,9 +1,11 @@
 """Maps of a state: those of the command line and Python lines that the page shows, coarse ones near the whole ones."""
 
+import shlex
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from softtact.cli import main
 from softtact.errors import InputError
@@ -19,11 +21,23 @@ MOVED = {"x_mm": 2.0, "y_mm": -3.0, "rotation_deg": (20.0, 90.0, 40.0), "slide_m
 def test_the_command_line_and_the_python_lines_give_the_press_that_is_shown(state, solver, tmp_path, change):
     shown = solver.solve(replace(state, **change))
     assert main([*shown.press.arguments, "--out", str(tmp_path / "press.nc")]) == 0
+    assert shlex.split(shown.press.command) == ["softtact", *shown.press.arguments, "--out", "press.nc"]
+    assert shlex.split(shown.press.command_lines.replace("\\\n", "")) == shlex.split(shown.press.command)
     names = {}
     exec(shown.press.python, names)
     for result in (read_press(tmp_path / "press.nc"), names["result"]):
         np.testing.assert_allclose(result.deformation_map_mm, shown.result.deformation_map_mm, atol=1e-9)
         assert result.normal_force_n == shown.result.normal_force_n and result.expected_error_mm == shown.result.expected_error_mm
+
+
+def test_a_mesh_that_had_to_be_repaired_has_lines_that_repair_it(state, solver, tmp_path):
+    ball = trimesh.load(state.object.path)
+    trimesh.Trimesh(ball.vertices, [*ball.faces, ball.faces[0]], process=False).export(tmp_path / "doubled.stl")
+    shown = solver.solve(replace(state, object=Object(tmp_path / "doubled.stl", "mm")), draft=False)
+    names = {}
+    exec(shown.press.python, names)
+    np.testing.assert_allclose(names["result"].deformation_map_mm, shown.result.deformation_map_mm, atol=1e-9)
+    assert "read_mended" in shown.press.python
 
 
 def test_on_a_gel_slide_and_twist_are_a_motion_with_friction(state, folder, tmp_path):
@@ -33,6 +47,7 @@ def test_on_a_gel_slide_and_twist_are_a_motion_with_friction(state, folder, tmp_
     names = {}
     exec(shown.press.python, names)
     np.testing.assert_allclose(names["result"].displacement_mm, shown.result.displacement_mm, atol=1e-9)
+    np.testing.assert_array_equal(shown.clearance_mm < 0, shown.result.traction_mpa[-1, ..., 2] < 0)
     by_depth = solver.solve(replace(moved, load_by="depth", depth_mm=0.3))
     assert by_depth.press.load == "z -0.3; x 0.5 in 5; rz 5 in 3" and by_depth.result.indentation_mm[-1] == pytest.approx(0.3)
 

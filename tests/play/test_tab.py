@@ -55,6 +55,7 @@ def tab(state, solver, seen, tmp_path):
     one.start()
     yield one
     one.close()
+    one._thread.join(30)     # it shares the solver with the next test
 
 
 def test_a_coarse_map_comes_first_and_the_whole_one_where_the_object_rests(tab, seen):

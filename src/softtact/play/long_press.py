@@ -1,5 +1,7 @@
 """A press by a model that takes long, in a process of its own: the very command line that the page shows."""
 
+import contextlib
+import os
 import subprocess
 import sys
 import time
@@ -11,6 +13,7 @@ from softtact.play.state import Press
 from softtact.press.result import PressResult, read_press
 from softtact.processes import start_tied
 
+_NICE = 10         # lower priority than the maps that follow the mouse
 _WAIT_S = 5.0     # for a process that was told to end
 
 
@@ -27,6 +30,8 @@ class LongPress:
         with self._words.open("w") as words:
             self._process = start_tied([sys.executable, "-m", "softtact", *press.arguments, "--out", str(self._file)],
                                        stdout=subprocess.DEVNULL, stderr=words, stdin=subprocess.DEVNULL)
+        with contextlib.suppress(OSError, AttributeError):      # AttributeError: no POSIX
+            os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
 
     @property
     def running(self) -> bool:

@@ -15,15 +15,17 @@ from softtact.play.solver import Shown
 from softtact.play.state import Object, State
 from softtact.play.tab import LONG_MODELS, Tab
 from softtact.press.result import PressResult
+from softtact.press.sensor import Sensor
 
 UNITS = ("mm", "cm", "m", "inch")
 _OBJECT, _BOARD = (228, 140, 60), (46, 60, 72)
 _BOARD_MM = 1.5             # thickness of the plate below the layers
 _ASIDE_MM = 0.02            # movement of the gizmo along z that counts as one
+_QUALITY = 92               # of the picture as JPEG, which is made in a fifth of a PNG's time
 _LEAST_DEPTH_MM, _DEEPEST = 0.01, 0.6     # of a press by depth: least, and the largest share of the thickness
 _STEP_MM, _STEP_DEG, _STEP_LOAD = 0.5, 5.0, 1.1      # of the keys
 # Of the camera, in lengths of the sensor's longer side, and how many times farther away it is on a narrow screen.
-_PERSPECTIVE, _FARTHER = np.array([0.45, -1.25, 1.1]), 1.7
+_PERSPECTIVE, _FARTHER = np.array([0.45, -1.25, 1.1]), 1.4
 
 
 class Page:
@@ -38,6 +40,7 @@ class Page:
         self._gizmo_from = np.zeros(3)
         self._depth_from = 0.0
         self.tab = Tab(state, self, folder)
+        self.tab.long_on_release = _has_frusta(self.tab.solver.sensor(state.sensor))
         self._build_panel(state, sensors)
         self._build_scene()
         self._add_keys()
@@ -52,7 +55,7 @@ class Page:
             self._show_object(shown)
             self._board.image = pictures.board(shown.result, shown.clearance_mm)
             self._numbers.content = self._table(shown)
-            self._same.content = f"```bash\n{shown.press.command}\n```\n```python\n{shown.press.python}\n```"
+            self._same.content = f"```bash\n{shown.press.command_lines}\n```\n```python\n{shown.press.python}\n```"
 
     def refuse(self, sentence: str) -> None:
         """Show why there is no map."""
@@ -87,7 +90,7 @@ class Page:
         gui = self._gui
         gui.set_panel_label("softtact play")
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        self._board = gui.add_image(np.full((416, 434, 3), 255, dtype=np.uint8), format="png")
+        self._board = gui.add_image(np.full((416, 434, 3), 255, dtype=np.uint8), format="jpeg", jpeg_quality=_QUALITY)
         self._numbers = gui.add_markdown("The first map follows.")
         with gui.add_folder("Load"):
             self._load_by = gui.add_dropdown("load by", ("force", "depth"), initial_value=state.load_by)
@@ -109,7 +112,7 @@ class Page:
             centre = gui.add_button("Centre", icon=viser.Icon.FOCUS_CENTERED)
         with gui.add_folder("Long model"):
             self._long = gui.add_dropdown("model", LONG_MODELS, initial_value="foundation")
-            self._on_release = gui.add_checkbox("after each release", False)
+            self._on_release = gui.add_checkbox("after each release", self.tab.long_on_release)
             run = gui.add_button_group("press again", ("Run", "Abandon"))
             self._long_words = gui.add_markdown("Not run.")
             self._difference = gui.add_image(np.full((8, 8, 3), 255, dtype=np.uint8), format="png", visible=False)
@@ -261,6 +264,7 @@ class Page:
         self._scene.add_box("/board", dimensions=(1.04 * width, 1.04 * length, _BOARD_MM), color=_BOARD,
                             position=(0.0, 0.0, -thickness - _BOARD_MM / 2), cast_shadow=False)
         self._force.max, self._depth.max = float(spec.force_range_n[1]), round(_DEEPEST * thickness, 2)
+        self._on_release.value = self.tab.long_on_release = _has_frusta(self.tab.solver.sensor(shown.state.sensor))
         if not self._sensor_shown:
             self._look(width, length)
         self._sensor_shown = shown.state.sensor
@@ -299,6 +303,11 @@ class Page:
             self._sensor.value = state.sensor
         if (name := self._name_of(state.object)) != self._object.value:
             self._object.value = name
+
+
+def _has_frusta(sensor: Sensor) -> bool:
+    """Whether a sensor has frusta, which the foundation model presses in seconds."""
+    return bool(np.isfinite(sensor.spec.frustum_height_mm))
 
 
 def _glb(mesh: trimesh.Trimesh) -> bytes:

@@ -82,6 +82,8 @@ def surface_mesh(result: PressResult) -> trimesh.Trimesh:
     each = max(1, round(max(result.deformation_map_mm.shape) / _MOST_POINTS))
     down = result.deformation_map_mm[-1][::each, ::each]
     x, y = np.meshgrid(result.x_mm[::each], result.y_mm[::each])
+    aside = np.nan_to_num(result.displacement_mm[-1][::each, ::each, :2])      # by friction, where the result knows it
+    x, y = x + aside[..., 0], y + aside[..., 1]
     top = np.column_stack([x.ravel(), y.ravel(), -down.ravel()])
     rgb = coloured(down, 0.0, max(float(down.max()), 1e-6)).reshape(-1, 3)
     rim = _rim(*down.shape)

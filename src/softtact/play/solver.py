@@ -6,12 +6,12 @@ What does not change between two states is kept: the sensor, the mesh, and the o
 import time
 import warnings
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 import trimesh
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
@@ -57,6 +57,7 @@ class Solver:
         self._sensors: dict[str, Sensor] = {}
         self._underside: tuple[tuple, HeightField, Pose] | None = None
         self._guess_n = 1.0
+        self._threads = cache(ThreadpoolController)     # looks for libraries, which takes a fifth of a map's time
 
     def sensor(self, name: str) -> Sensor:
         """The sensor of a name. Raises InputError for one that is unknown or not of layers."""
@@ -83,7 +84,7 @@ class Solver:
         """
         start = time.perf_counter()
         sensor, mended = self.sensor(state.sensor), _mended(state.object)
-        with warnings.catch_warnings(record=True) as caught, threadpool_limits(limits=1):
+        with warnings.catch_warnings(record=True) as caught, self._threads().limit(limits=1):
             warnings.simplefilter("always")
             press, result = (self._on_gel if sensor.spec.edge.far else self._on_layers)(state, sensor, mended, draft)
         remarks = tuple(dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning)))
@@ -148,10 +149,15 @@ class Solver:
 
 
 def _clearance(surface, result, down_mm):
-    """Distance (y, x) in mm, less a tolerance, of the object, `down_mm` below its pose, from the surface at the map's points."""
-    heights, _ = surface(*(line.ravel() for line in np.meshgrid(result.x_mm, result.y_mm)))
+    """Distance (y, x) in mm, less a tolerance, of the object, `down_mm` below its pose, from the surface at the map's points.
+
+    Where the result knows the pressure, it alone says where they touch.
+    """
     surface_mm = -result.deformation_map_mm[-1]
     tolerance = _TOUCHES * np.abs(surface_mm).max() + _ALWAYS_MM
+    if np.isfinite(pressure := -result.traction_mpa[-1][..., 2]).all():
+        return np.where(pressure > 0, -tolerance, tolerance)
+    heights, _ = surface(*(line.ravel() for line in np.meshgrid(result.x_mm, result.y_mm)))
     return np.clip(heights.reshape(surface_mm.shape) - down_mm - surface_mm - tolerance, -tolerance, tolerance)
 
 

@@ -108,6 +108,12 @@ class Press:
         return shlex.join(["softtact", *self.arguments, "--out", "press.nc"])
 
     @property
+    def command_lines(self) -> str:
+        """The command line with an option on each line."""
+        words = [shlex.quote(word) for word in ["softtact", *self.arguments, "--out", "press.nc"]]
+        return "".join(f" \\\n    {word}" if word.startswith("--") else f" {word}" for word in words).strip()
+
+    @property
     def python(self) -> str:
         """The lines of Python that give the same press."""
         load = f"force_n={self.load:g}" if isinstance(self.load, float) else f"motion={self.load!r}"
@@ -117,9 +123,8 @@ class Press:
         if self.repaired:
             read = f"from softtact.geometry.repair import read_mended\n\nmesh = read_mended({mesh}).mesh\n"
             pressed = "mesh"
-        return (f"import softtact\n{read}sensor = softtact.load_sensor({self.sensor!r})\n"
-                f"result = sensor.press({pressed}, pose=[{', '.join(self._pose)}],\n"
-                f"                      {load}, model={self.model!r})")
+        return (f"import softtact\n{read}\nsensor = softtact.load_sensor({self.sensor!r})\nresult = sensor.press(\n    {pressed},\n"
+                f"    pose=[{', '.join(self._pose)}],\n    {load}, model={self.model!r})")
 
     @property
     def _pose(self):

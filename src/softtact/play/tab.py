@@ -64,10 +64,11 @@ class Tab:
         self._recorded: list[tuple[float, State]] = []
         self._lock, self._wake, self._closed = threading.RLock(), threading.Event(), threading.Event()
         self._preparing: set[str] = set()
+        self._thread = threading.Thread(target=self._work, daemon=True, name="softtact play")
 
     def start(self) -> None:
         """Start the thread that computes."""
-        threading.Thread(target=self._work, daemon=True, name="softtact play").start()
+        self._thread.start()
 
     def close(self) -> None:
         """End the thread, and a long press with it."""
