@@ -24,6 +24,13 @@ def test_rows_that_repeat_a_frame_are_no_frozen_ones(seed):
     assert [one.sentence for one in check_recording(bench.recording())] == []
 
 
+def test_frames_that_are_renewed_each_third_of_a_second_are_no_frozen_ones():
+    bench = ramp()
+    bench.time_s, bench.log_s = 3 * bench.time_s, 3 * bench.log_s
+    bench.counts = bench.counts[np.arange(400) // 10 * 10]
+    assert "frozen" not in {one.check for one in check_recording(bench.recording())}
+
+
 def told(bench, check, *, log=True):
     """The findings of a check, which must be the only ones."""
     found = check_recording(bench.recording() if log else bench.alone())

@@ -38,7 +38,7 @@ def _after_header(path, lines):
     """The lines from that of the counts on."""
     number, (word, *rest) = lines[0] if lines else (1, [b""])
     if not _HEADER.fullmatch(word) or rest[:1] == [b"BINARY"]:
-        fault = "it is binary" if rest else f"line {number}: {shown(word)} stands where 'OFF' is due"
+        fault = "it is binary" if rest[:1] == [b"BINARY"] else f"line {number}: {shown(word)} stands where 'OFF' is due"
         raise InputError(f"{path}: {fault}; export the mesh as an OFF file of text, or as STL.")
     return ([(number, rest)] if rest else []) + lines[1:] or [(number, rest)]
 
