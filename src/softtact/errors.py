@@ -67,7 +67,7 @@ class NarrowPartWarning(UserWarning):
 
 
 class FrameWarning(UserWarning):
-    """A camera frame may not meet the assumptions of the detection of discs."""
+    """A camera frame, or a mask, may not meet the assumptions of what reads it."""
 
 
 class MeshWarning(UserWarning):

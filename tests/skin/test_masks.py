@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from softtact.errors import InputError
+from softtact.errors import FrameWarning, InputError
 from softtact.skin.loads import mask
 
 ROW, COLUMN = np.mgrid[:60, :60]
@@ -44,3 +44,14 @@ def test_what_is_transparent_is_named_in_the_load(tmp_path):
 def test_white_ink_on_nothing_is_refused(tmp_path):
     with pytest.raises(InputError, match="no pixel that is seen is dark, and what is transparent does not press"):
         area_mm2(layered(WHITE, 255 * INK), tmp_path / "print.png")
+
+
+@pytest.mark.parametrize(("kind", "white"), [("f4", 1.0), ("i4", 255), ("i4", 65535), ("u2", 255), ("u2", 4095)])
+def test_the_lightest_pixel_of_more_than_8_bits_is_paper(kind, white, tmp_path):
+    picture = Image.fromarray(np.where(INK, 0, white).astype(kind))
+    assert area_mm2(picture, tmp_path / "print.tif") == pytest.approx(0.01 * INK.sum())
+
+
+def test_white_on_black_is_told(tmp_path):
+    with pytest.warns(FrameWarning, match="print.png: its whole edge is dark and presses; if the print is white on black, invert"):
+        area_mm2(Image.fromarray(np.where(INK, 255, 0).astype(np.uint8)), tmp_path / "print.png")

@@ -1,11 +1,12 @@
 """Loads on a skin: pressure on a disc, an ellipse or a mask, as forces on many points whose sum is exact."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from softtact.errors import InputError
+from softtact.errors import FrameWarning, InputError
 from softtact.inputs import check_input, check_limit, in_one_sentence
 from softtact.skin.layout import Layout
 
@@ -69,7 +70,11 @@ def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, p
     with in_one_sentence(path, "not a readable picture", "save the mask as PNG"), Image.open(path) as picture:
         check_limit(path, "pixels", picture.width * picture.height)
         grey, partly = _on_white(picture)
-    row, column = np.nonzero(grey < 128)
+    dark = grey < 128
+    row, column = np.nonzero(dark)
+    if not dark.all() and np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]]).all():
+        warnings.warn(f"{path}: its whole edge is dark and presses; if the print is white on black, invert the picture.",
+                      FrameWarning, stacklevel=2)
     if not len(row):
         light = "no pixel that is seen is dark, and what is transparent does not press" if partly else "no pixel is dark"
         raise InputError(f"{path}: {light}, so that nothing presses; draw the contact area in black on white.")
@@ -85,11 +90,15 @@ def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, p
 
 
 def _on_white(picture):
-    """Grey values (row, column), 0 to 255, of a picture on white paper, and whether a part of it is transparent."""
+    """Grey values (row, column), 0 to 255, of a picture on white paper, and whether a part of it is transparent.
+
+    White is 255, or the lightest pixel of a picture of more than 8 bits.
+    """
     from PIL import Image
 
-    if picture.mode.startswith("I"):     # 16 bits a pixel, which Pillow would cut off at 255
-        return np.asarray(picture) // 257, False
+    if picture.mode.startswith(("I", "F")):     # 12, 16 or 32 bits a pixel, or 0 to 1: Pillow would cut them off at 255
+        values = np.asarray(picture, dtype=float)
+        return 255 * values / values.max() if values.max() > 0 else 0 * values, False
     if not picture.has_transparency_data:
         return np.asarray(picture.convert("L")), False
     coloured = picture.convert("RGBA")
