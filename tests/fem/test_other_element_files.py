@@ -161,3 +161,11 @@ def test_bulk_data_of_nastran_needs_no_beginning_and_may_be_in_small_letters(tmp
 def test_an_array_that_may_name_regions_is_told_where_it_is_left_out(tmp_path):
     body = read_body(paraview(tmp_path, name="label"), unit="mm")
     assert body.mesh.regions == ["body"] and "the array label of whole numbers is left out" in body.remarks[0]
+
+
+def test_whole_numbers_of_pyvista_in_old_vtk_files_are_read(tmp_path):
+    meshio.Mesh(NODES, [("tetra", TETRA)], cell_data={"MaterialIDs": [NUMBER]}).write(tmp_path / "body.vtk", binary=False)
+    text = (tmp_path / "body.vtk").read_text()
+    (tmp_path / "body.vtk").write_text(text.replace("MaterialIDs 1 48 vtktypeint64", "MaterialIDs 1 48 long"))
+    assert " long" in (tmp_path / "body.vtk").read_text()
+    assert read_body(tmp_path / "body.vtk", unit="mm").mesh.regions == ["3", "7"]

@@ -7,6 +7,7 @@ files of which it read fewer cells than they state.
 import contextlib
 import io
 import re
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,7 @@ _UNHANDLED = {"pixel", "wedge15", *(f"vtk_{order}_{shape}" for order in ("lagran
     "curve", "triangle", "quadrilateral", "tetrahedron", "hexahedron", "wedge", "pyramid"))}
 _DROPPED = re.compile(r"cannot handle \(type (\d+)\)|doesn't know \w*(?:Tetra|Hexa|Prism|Pyramid|Triangles|Quadri)\w* type")
 _NASTRAN = (".bdf", ".nas", ".fem")
+_LONG = re.compile(rb"^(SCALARS \S+ |\w+ \d+ \d+ )long\b", re.MULTILINE)
 _NOT_READ = re.compile(r"^[ \t]*(INCLUDE\b.{,60}|GRDSET\b)", re.MULTILINE | re.IGNORECASE)
 # Corners of MED's elements in VTK's order; between them the edges have one order in both.
 _MED = {"tetra": [0, 2, 1, 3], "hexahedron": [0, 3, 2, 1, 4, 7, 6, 5], "wedge": [0, 2, 1, 3, 5, 4]}
@@ -72,15 +74,13 @@ def read_other(path: Path) -> RawMesh:
 
 def _read(path: Path) -> tuple["meshio.Mesh", list[str]]:
     """The mesh as meshio reads it, and its warnings, which it prints."""
-    import meshio
-
     _refuse_impossible_counts(path)
     printed = io.StringIO()
     known = "give VTU, or another volume mesh that is read, such as those of Gmsh or Abaqus"
     with in_one_sentence(path, "not readable as a mesh of elements", known):
         try:
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-                read = meshio.read(path) if path.suffix.lower() not in _NASTRAN else meshio.read(_bulk_data(path), "nastran")
+                read = _by_meshio(path)
         except SystemExit:     # meshio ends the program for an unknown format
             text = " ".join(printed.getvalue().split()).removeprefix("Error: ")
             raise ValueError(text or "unknown format") from None
@@ -90,6 +90,20 @@ def _read(path: Path) -> tuple["meshio.Mesh", list[str]]:
             raise
     warned = " ".join(printed.getvalue().split()).split("Warning: ")[1:]
     return read, list(dict.fromkeys(one.strip().rstrip(".") for one in warned))
+
+
+def _by_meshio(path):
+    import meshio
+
+    if path.suffix.lower() in _NASTRAN:
+        return meshio.read(_bulk_data(path), "nastran")
+    content = path.read_bytes() if path.suffix.lower() == ".vtk" else b""
+    if not _LONG.search(content):
+        return meshio.read(path)
+    with tempfile.TemporaryDirectory() as folder:      # meshio does not know the type that PyVista gives to whole numbers
+        copy = Path(folder) / path.name
+        copy.write_bytes(_LONG.sub(rb"\1vtktypeint64", content))
+        return meshio.read(copy)
 
 
 def _bulk_data(path):
