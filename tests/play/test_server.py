@@ -9,6 +9,7 @@ import urllib.request
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from support.chromium import Chromium
 
@@ -88,6 +89,20 @@ def test_what_cannot_be_played_is_refused_before_the_server_starts(tmp_path, cap
                              (["--sensor", "nowhere"], "no sensor"), (["--out", "broken.stl"], "broken.stl")):
         assert main(["play", "--no-open", *arguments]) == 1
         assert words in capsys.readouterr().err
+
+
+@needs_browser
+@pytest.mark.slow
+def test_a_broken_mesh_is_told_in_its_sentence_and_the_page_lives_on(server, tmp_path):
+    (tmp_path / "broken_1_a.stl").write_bytes(b"solid x\nfacet nothing\n")
+    trimesh.creation.torus(6, 2).export(tmp_path / "ring.stl")
+    with Chromium(server.url) as tab:
+        tab.wait_for_text("whole")
+        tab.upload(tmp_path / "broken_1_a.stl")
+        tab.wait_for_text("No map. " + str(tmp_path / "out/uploads/broken_1_a.stl"))
+        tab.upload(tmp_path / "ring.stl")
+        tab.wait_for_text(f"softtact press {tmp_path / 'out/uploads/ring.stl'}")
+    assert {path.name for path in (tmp_path / "out/uploads").iterdir()} == {"broken_1_a.stl", "ring.stl"}
 
 
 @needs_browser

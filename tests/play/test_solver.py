@@ -52,6 +52,12 @@ def test_on_a_gel_slide_and_twist_are_a_motion_with_friction(state, folder, tmp_
     assert by_depth.press.load == "z -0.3; x 0.5 in 5; rz 5 in 3" and by_depth.result.indentation_mm[-1] == pytest.approx(0.3)
 
 
+def test_an_object_that_rests_on_the_shell_is_remarked(state, solver, tmp_path):
+    trimesh.creation.box((40.0, 60.0, 5.0)).export(tmp_path / "plate.stl")
+    shown = solver.solve(replace(state, object=Object(tmp_path / "plate.stl", "mm"), rotation_deg=(0.0, 20.0, 0.0), force_n=20.0))
+    assert "rests on the shell" in shown.remarks[0] and len(shown.remarks) == 1
+
+
 def test_the_coarse_map_is_near_the_whole_one(state, solver):
     coarse, whole = solver.solve(state, draft=True), solver.solve(state)
     assert coarse.draft and not whole.draft

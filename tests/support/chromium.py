@@ -1,4 +1,4 @@
-"""Chromium by its debugging port: text, keys, drags, screenshots, and the addresses that a page asked for."""
+"""Chromium by its debugging port: text, keys, uploads, screenshots, and the addresses that a page asked for."""
 
 import base64
 import json
@@ -53,6 +53,12 @@ class Chromium:
     def click(self, label):
         """Click the button with a label."""
         self.evaluate(f"[...document.querySelectorAll('button')].find(one => one.innerText.startsWith({label!r})).click()")
+
+    def upload(self, path):
+        """Give a file to the page's first field for files."""
+        root = self._call("DOM.getDocument", depth=-1)["root"]["nodeId"]
+        field = self._call("DOM.querySelectorAll", nodeId=root, selector="input[type=file]")["nodeIds"][0]
+        self._call("DOM.setFileInputFiles", files=[str(path)], nodeId=field)
 
     def key(self, letter):
         """Press and release a letter's key."""

@@ -1,5 +1,6 @@
 """The page of one tab: widgets and the 3-D scene of viser, which show a `Tab` and change its state."""
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -59,16 +60,16 @@ class Page:
 
     def refuse(self, sentence: str) -> None:
         """Show why there is no map."""
-        self._numbers.content = f"**No map.** {sentence}"
+        self._numbers.content = f"**No map.** {_plain(sentence)}"
 
     def tell(self, sentence: str) -> None:
         """Show what a button did."""
-        self._told.content = sentence
+        self._told.content = _plain(sentence)
 
     def show_long(self, words: str, result: PressResult | None, elastic: Shown | None) -> None:
         """Show a long press: its progress, or its end with the difference to the elastic map of the same press."""
         if result is None or elastic is None:
-            self._long_words.content = words
+            self._long_words.content = _plain(words)
             return
         if result.deformation_map_mm is None:
             self._long_words.content = f"{words}: it gives no map."
@@ -78,7 +79,7 @@ class Page:
         depth = result.indentation_mm[-1]
         lines = [f"**{words}**: {depth:.3f} mm deep; the elastic map differs by {rms:.4f} mm (root mean square)."]
         if result.selection_reason:
-            lines.append(f"Why this model: {result.selection_reason}.")
+            lines.append(f"Why this model: {_plain(result.selection_reason)}.")
         lines += [f"Not within validity: {why}." for why in result.validity_reason[-1:] if why]
         self._long_words.content = "\n\n".join(lines)
         self._difference.image = pictures.comparison(result, elastic.result)
@@ -215,7 +216,7 @@ class Page:
         if state.moves and not result.attributes["edge"].startswith("far") and np.isnan(result.slip).all():
             notes.append("The elastic model has no friction here: slide and twist only change the place.")
         head = "| elastic model | |\n|---|---|\n"
-        return head + "\n".join(f"| {name} | {value} |" for name, value in rows) + "".join(f"\n\n{note}" for note in notes)
+        return head + "\n".join(f"| {name} | {value} |" for name, value in rows) + "".join(f"\n\n{_plain(note)}" for note in notes)
 
     # --- scene ---
 
@@ -303,6 +304,11 @@ class Page:
             self._sensor.value = state.sensor
         if (name := self._name_of(state.object)) != self._object.value:
             self._object.value = name
+
+
+def _plain(sentence: str) -> str:
+    """A sentence as Markdown that shows it as it is, such as a file's name with underscores."""
+    return re.sub(r"([\\`*_<>\[\]{}|#$])", r"\\\1", sentence)
 
 
 def _has_frusta(sensor: Sensor) -> bool:

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import threading
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ class PlayServer:
 
     def __init__(self, state: State, objects: dict[str, Object], sensors: list[str], folder: Path, *, port: int) -> None:
         """Serve on a port, or the next free one; 0 takes any. objects: what the page offers, by name; state: of a new tab."""
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)     # a tab was closed during a press
         self._folder = Folder(folder)
         self._pages: dict[int, Page] = {}
         self._lock = threading.Lock()

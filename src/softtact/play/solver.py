@@ -3,6 +3,7 @@
 What does not change between two states is kept: the sensor, the mesh, and the object's underside where it does not turn.
 """
 
+import threading
 import time
 import warnings
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ from softtact.press.sensor import Sensor, load_sensor
 from softtact.press.task import checked_forces
 from softtact.press.validity import flag_buried
 
+_ALONE = threading.Lock()     # filters of warnings, and numbers of threads, are those of the whole process
 _TOUCHES, _ALWAYS_MM = 0.02, 1e-3     # share of the depth, and mm, that object and surface may be apart where they touch
 
 
@@ -84,10 +86,10 @@ class Solver:
         """
         start = time.perf_counter()
         sensor, mended = self.sensor(state.sensor), _mended(state.object)
-        with warnings.catch_warnings(record=True) as caught, self._threads().limit(limits=1):
+        with _ALONE, warnings.catch_warnings(record=True) as caught, self._threads().limit(limits=1):
             warnings.simplefilter("always")
             press, result = (self._on_gel if sensor.spec.edge.far else self._on_layers)(state, sensor, mended, draft)
-        remarks = tuple(dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning)))
+        remarks = tuple(dict.fromkeys(str(one.message) for one in caught if one.category.__module__.startswith("softtact.")))
         at_end = Pose.from_values(state.pose(mended.mesh, moved=True))
         surface = self._surface(state, mended, at_end)
         touch = first_touch_mm(sensor, surface)

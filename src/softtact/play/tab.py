@@ -223,7 +223,8 @@ class Tab:
 
     def _publish(self, shown):
         self.shown, self._refused = shown, None
-        self._view.show(shown)
+        if not self._closed.is_set():
+            self._view.show(shown)
 
     def _is_prepared(self, name):
         """Whether the whole map's compliance is there; else it is prepared in a thread, once."""
