@@ -110,10 +110,13 @@ def standing_log(recording: "xarray.Dataset", spoiled: np.ndarray) -> Iterator[F
         level, span = _smooth(press.level), np.ptp(press.level)
         runs = Runs.of(press.force_n)
         for first, count in zip(runs.first, runs.length, strict=True):
-            run = slice(first, first + count)
-            change, kept = np.ptp(level[run]), abs(level[first] - level[first + count - 1])
+            time = press.time_s[first:first + count]
+            run = first + np.flatnonzero((time > time[0] + _LAG_S) & (time < time[-1] - _LAG_S))     # without a log's small delay
+            if len(run) < _FEWEST or np.ptp(time[run - first]) < _STANDS_S:
+                continue
+            change, kept = np.ptp(level[run]), abs(level[run[0]] - level[run[-1]])
             changes = change > max(_CHANGES * span, 10 * press.noise) or change - kept > max(_RETURNS * span, 10 * press.noise)
-            if count < _FEWEST or np.ptp(press.time_s[run]) < _STANDS_S or not changes:
+            if not changes:
                 continue
             begin, end = press.rows[first], press.rows[first + count - 1]
             left_out = np.zeros(recording.counts.shape, dtype=bool)
