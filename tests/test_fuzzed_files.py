@@ -21,11 +21,14 @@ from softtact.learning.prediction import read_maps
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curve
+from softtact.materials.time_tests import read_time_tests
 from softtact.reporting.press_view import read_view
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 from softtact.studies.hybrid.config import load_study
 from tests.support.element_files import block, hexahedra, inp_assembly, inp_part, msh22, msh41
+from tests.support.object_files import ONE, file_3mf, file_amf, file_dae, file_glb, file_off, mesh_3mf, packed
+from tests.support.sound_recordings import ramp
 
 ROOT = Path(__file__).resolve().parents[1]
 BOX = trimesh.creation.box(extents=(4, 5, 6))
@@ -117,6 +120,47 @@ def test_a_damaged_mesh_is_refused_by_name_or_read_as_a_closed_body(kind, tmp_pa
     assert reader.refused >= 10 and reader.taken > 0
 
 
+OBJECTS = {"box.3mf": file_3mf(mesh_3mf(), ONE), "box.amf": file_amf(), "box.glb": file_glb(), "box.off": file_off(),
+           "box.dae": file_dae(), "box.zip": packed(**{"a/box.off": file_off()})}
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_a_damaged_object_of_another_format_is_refused_by_name_or_read_as_a_closed_body(name, tmp_path):
+    if name.endswith(".dae"):
+        pytest.importorskip("collada", reason="pip install 'softtact[cad]'")
+    path = tmp_path / name
+    reader = Reader(lambda: read_mended(path, unit="mm" if name.endswith((".off", ".zip")) else None), named=path.name)
+
+    @quick
+    @given(damaged(OBJECTS[name]))
+    def damage(data):
+        path.write_bytes(data)
+        mended = reader()
+        if mended is not None:
+            assert mended.mesh.is_watertight and mended.mesh.volume > 0
+
+    damage()
+    assert reader.refused >= 5 and reader.taken > 0
+
+
+def test_a_damaged_bag_is_refused_by_name_or_read(tmp_path):
+    pytest.importorskip("rosbags", reason="pip install 'softtact[ros]'")
+    from softtact.readout.bags import read_bag, write_bag
+
+    write_bag(tmp_path / "sound.mcap", ramp().recording().isel(time=slice(30, 60)).assign_attrs(start_ms=1_764_000_000_123))
+    content, path = (tmp_path / "sound.mcap").read_bytes(), tmp_path / "press.mcap"
+    reader = Reader(lambda: read_bag(path), named=path.name)
+
+    @quick
+    @given(damaged(content))
+    def damage(data):
+        path.write_bytes(data)
+        reader()
+
+    damage()
+    assert reader.refused >= 10
+
+
 @pytest.mark.parametrize("kind", ["stl", "stl_ascii", "ply"])
 def test_a_mesh_cut_off_anywhere_is_refused_by_name_or_whole(kind, tmp_path):
     content = BOX.export(file_type=kind)
@@ -156,6 +200,8 @@ def test_damaged_elements_are_refused_by_name_or_read_as_a_body(name, tmp_path):
 
 @pytest.mark.parametrize(("name", "content", "read"), [
     ("uniaxial.csv", CURVE, read_curve),
+    ("relaxation.csv", b"time_s,nominal_stress_mpa\n0,1.0\n1,0.8\n2,0.7\n5,0.6\n9,0.55\n",
+     lambda path: read_time_tests([(path, "relaxation")])),
     ("card.json", CARD, lambda path: law_from_card(load_card(path))),
     ("sensor.yaml", sensor_file("coro").read_bytes(), SensorSpec.from_yaml),
     ("neoprene.yaml", material_file("neoprene").read_bytes(), load_material),

@@ -48,7 +48,7 @@ def _without_unit(read: Callable[[Path, bytes], np.ndarray]) -> Callable[[Path, 
 def _with_unit(read: Callable[[Path, bytes], tuple[np.ndarray, str]]) -> Callable[[Path, bytes], Facets]:
     def of(path: Path, data: bytes) -> Facets:
         triangles, unit = read(path, data)
-        return Facets(triangles, unit, notes=(f"read in {unit}, the unit that the file states",))
+        return Facets(triangles, unit, notes=(f"read in {unit}, the unit of the file",))
 
     return of
 
@@ -60,7 +60,7 @@ def _glb(path: Path, data: bytes) -> Facets:
 
 def _dae(path: Path, data: bytes) -> Facets:
     triangles, unit, up = read_dae(path, data)
-    return Facets(triangles, unit, notes=(f"read in {unit}, the unit that the file states; its axes stay as they are, and {up} "
+    return Facets(triangles, unit, notes=(f"read in {unit}, the unit of the file; its axes stay as they are, and {up} "
                                           "points up: --pose turns the object",))
 
 

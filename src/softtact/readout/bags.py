@@ -194,8 +194,11 @@ def _opened(path) -> Iterator[_Bag]:
     for file in _files(path):
         check_input(file, "bag", missing="there is no such bag; give an .mcap file, or the folder of a rosbag2.")
     with in_one_sentence(path, "it cannot be read as a ROS 2 bag", _DAMAGED):
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            yield _Bag(path, reader)
+        try:
+            with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
+                yield _Bag(path, reader)
+        except MemoryError:     # rosbags asks for as many bytes as a damaged record states
+            raise InputError(f"{path}: a record of it is longer than memory; {_DAMAGED}.") from None
 
 
 def _files(path):

@@ -112,6 +112,8 @@ class GraspEnv(gymnasium.Env):
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Ten milliseconds of the scene."""
+        if not hasattr(self, "_scene"):
+            raise InputError("step: there is no scene yet; call reset first.")
         grip, lift, slide = np.clip(_three_numbers(action), -1.0, 1.0)
         self._move_hand(lift, slide)
         self._move_fingers(0.5 * (grip + 1.0))
@@ -188,7 +190,8 @@ class GraspEnv(gymnasium.Env):
 def _three_numbers(action):
     """An action as three finite numbers."""
     try:
-        values = np.asarray(action, dtype=float)
+        values = np.asarray(action)
+        values = values.astype(float) if values.dtype.kind in "fiu" else np.array(np.nan)
     except (TypeError, ValueError):
         values = np.array(np.nan)
     if values.shape != (3,) or not np.isfinite(values).all():
