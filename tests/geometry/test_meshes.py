@@ -77,8 +77,8 @@ def test_a_missing_file_is_refused(tmp_path):
 
 
 def test_another_format_is_refused(tmp_path):
-    (tmp_path / "part.dae").write_text("<COLLADA/>")
-    assert "'.dae'" in refusal(tmp_path / "part.dae")
+    (tmp_path / "part.igs").write_text("IGES")
+    assert "'.igs'" in refusal(tmp_path / "part.igs")
 
 
 def test_an_empty_file_is_refused(tmp_path):

@@ -119,8 +119,8 @@ def test_a_wrong_argument_is_refused_in_one_sentence(wrong, said):
         gymnasium.make(ID, **wrong)
 
 
-@pytest.mark.parametrize("action", [[np.nan, 0, 0], [1, np.nan, 0], [0, 0, np.inf], [0, 0], [0, 0, 0, 0], ["close", 0, 0], ["1", "0", "0"],
-                                    [1j, 0, 0], 1.0, None])
+@pytest.mark.parametrize("action", [[np.nan, 0, 0], [1, np.nan, 0], [0, 0, np.inf], [0, 0], [0, 0, 0, 0], ["close", 0, 0],
+                                    ["1", "0", "0"], [1j, 0, 0], 1.0, None])
 def test_an_action_that_is_not_three_finite_numbers_is_refused_and_moves_nothing(env, action):
     env.reset(seed=1, options=STILL)
     before = env.unwrapped._data.time
