@@ -59,7 +59,7 @@ def lines_on_layers(summary: dict[str, Any], *, verbose: bool) -> Iterator[str]:
     yield from _table_on_layers(summary) if "tactile_map" in summary else gel_lines(summary)
     yield from _sure_lines(summary)
     if verbose:
-        yield from _solver_lines(summary, of="a layer")
+        yield from _solver_lines(summary)
     yield from (f"written: {path}" for path in summary["written"])
 
 
@@ -128,7 +128,7 @@ def _extrapolated_line(summary, *, of):
         yield f"strained beyond the data behind its law: {max(shares):.1%} of {of}"
 
 
-def _solver_lines(summary, *, of):
+def _solver_lines(summary):
     """How the solver did, as the worst of the load steps."""
     yield f"linear solver: {summary['solver']}; iterations: {sum(summary['iterations'])}"
     yield f"deepest overlap in a contact: {plain(max(summary['penetration_mm']), 2)} mm"
@@ -154,7 +154,7 @@ def lines_on_solids(summary: dict[str, Any], *, verbose: bool) -> Iterator[str]:
             yield _row((*point, *displacement)) + f"{'-' if pressure is None else plain(pressure, 4):>15}"
     yield from _extrapolated_line(summary, of="a region")
     if verbose:
-        yield from _solver_lines(summary, of="a region")
+        yield from _solver_lines(summary)
     yield from (f"written: {path}" for path in summary["written"])
 
 

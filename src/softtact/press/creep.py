@@ -17,9 +17,12 @@ from softtact.errors import InputError
 from softtact.press.result import PressResult
 
 if TYPE_CHECKING:
+    import xarray
+
     from softtact.sensors.base import BaseSpec
 
 _ALIKE = 1e-12  # of the largest force: forces that differ by less are one load step
+_UNITS_OF_FORCE = ("N", "N mm", "MPa")  # of readings that follow the load
 _FORCES = ("normal_force_n", "pad_force_n", "shell_force_n", "force_n", "torque_nmm", "residual_n", "traction_mpa")
 
 
@@ -76,6 +79,17 @@ def at_times(result: PressResult, load_step: np.ndarray, effective_n: np.ndarray
     changed["wall_time_s"] = np.where(np.diff(index, prepend=-1) > 0, result.wall_time_s[index], 0.0)
     placed = result.placed_object
     return replace(result, **changed, time_s=motion.times_s[there],      # type: ignore[index]
-                   readings={name: reading.isel(step=index) for name, reading in result.readings.items()},
+                   readings={name: _read_under(reading.isel(step=index), scale) for name, reading in result.readings.items()},
                    bodies=tuple(result.bodies[k] for k in index) if result.bodies else (),
                    placed_object=placed and replace(placed, way_mm=placed.way_mm[index]))
+
+
+def _read_under(reading: "xarray.DataArray", scale: np.ndarray) -> "xarray.DataArray":
+    """A reading (step, ...) with its forces and pressures times scale (step,); counts, depths and images stay."""
+    import xarray
+
+    factor, follows = xarray.DataArray(scale, dims="step"), _UNITS_OF_FORCE
+    if "units" in reading.coords:
+        times = xarray.where(reading["units"].isin(follows), factor, 1.0).transpose("step", ...)
+        return reading.copy(data=(reading * times).transpose(*reading.dims).values)
+    return reading.copy(data=(reading * factor).values) if reading.attrs.get("units") in follows else reading
