@@ -47,6 +47,23 @@ def test_the_elements_fill_the_cover_and_its_faces_the_top_and_the_bottom():
             assert np.prod(corner[:, 2, :2] - corner[:, 0, :2], axis=1).sum() == pytest.approx(24.0), seed
 
 
+def test_the_least_volume_ratio_is_that_of_a_homogeneous_deformation():
+    mesh = cover_mesh(X, Y, HEIGHTS, random_levels(0))
+    gradient = np.array([[0.1, 0.3, 0.0], [-0.02, -0.2, 0.1], [0.0, 0.4, -0.5]])
+    ratio = mesh.least_volume_ratio(mesh.points[:mesh.free] @ gradient.T)
+    assert ratio == pytest.approx(np.linalg.det(np.eye(3) + gradient), rel=1e-12)
+
+
+def test_a_corner_that_is_pushed_through_its_element_shows_in_the_least_volume_ratio_though_no_integration_point_is_inverted():
+    """Along the side of 1 mm below a corner that is lowered by 0.45 mm, dz / dZ at it is 1 - 3 * 0.45."""
+    mesh = cover_mesh(np.array([0.0, 1.0]), np.array([0.0, 1.0]), np.array([-1.0, 0.0]), np.zeros((1, 1, 1), dtype=int))
+    lowered = np.zeros_like(mesh.points)
+    lowered[np.flatnonzero((mesh.points == [1.0, 1.0, 0.0]).all(axis=1)), 2] = -0.45
+    gradients, _ = reference_gradients((mesh.points + lowered)[mesh.hexes], HEX20.shape(gauss(2, 3)[0])[1], gauss(2, 3)[1])
+    assert np.isfinite(gradients).all()      # which raises where a point is inverted
+    assert mesh.least_volume_ratio(lowered) == pytest.approx(1 - 3 * 0.45, rel=1e-12)
+
+
 @pytest.mark.parametrize("caps", [(0, 1, 2), (1, 0, 2)])
 def test_a_split_slab_passes_the_patch_test(caps):
     """A linear displacement: no force on nodes inside, to round-off."""

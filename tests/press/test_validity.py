@@ -12,7 +12,8 @@ from softtact.press.sensor import Sensor
 from softtact.press.validity import flags_elastic, flags_foundation, flags_hyperelastic, reasons
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
-        "rough": [False, False, False], "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}
+        "rough": [False, False, False], "volume_ratio": [0.9, 0.5, np.nan], "depth_mm": [0.1, 0.2, 0.3],
+        "forces_n": [5.0, 20.0, 50.0]}
 
 
 def valid(**changed):
@@ -32,7 +33,7 @@ def test_all_load_steps_of_a_good_press_hold():
 
 @pytest.mark.parametrize("changed", [
     {"compression_mm": [0.1, 0.2, 0.41]}, {"contact_error_mm": [0.0, 0.001, 0.0031]}, {"points": [9, 40, 8]},
-    {"rough": [False, False, True]}])
+    {"rough": [False, False, True]}, {"volume_ratio": [0.9, 0.01, 0.0]}])
 def test_each_criterion_flags_its_own_load_step_alone(changed):
     assert valid(**changed) == [True, True, False]
 
@@ -67,6 +68,18 @@ def test_a_flagged_load_step_names_its_limits_and_all_of_its_reasons():
     deep = "the object is deeper in than 1.25 mm, half of the linear layer"
     thin = "a wall or pin narrower than three points of the surface is deeper in than 0.5 mm, half of the dielectric"
     assert reasons(flags, 3).tolist() == [thin, f"{deep}; {thin}", deep]
+
+
+def test_a_load_step_at_which_the_cover_folds_under_an_edge_is_flagged_though_the_press_converges():
+    """A wall of 0.3 mm, tilted by 20 degrees, on elements of 1.2 mm: their corners turn inside out, but no integration point."""
+    wall = trimesh.creation.box((0.3, 4.0, 5.0))
+    wall.apply_transform(trimesh.transformations.rotation_matrix(np.radians(20), (1, 0, 0)))
+    wall.apply_translation([0.1, 0.2, -wall.bounds[0, 2]])
+    sensor = Sensor(SMALL, LAWS, mesh=COARSE, solver=NewtonSettings.draft())
+    result = sensor.press(wall, pose=np.eye(4), force_n=[1.0, 2.0], model="hyperelastic", label="")
+    assert 0 < result.least_volume_ratio[0] < 0.6 and result.least_volume_ratio[1] < 0
+    assert result.converged.tolist() == [1, 1] and result.within_validity.tolist() == [1, 0]
+    assert result.validity_reason[1].startswith("an element of the cover is folded at a corner")
 
 
 @pytest.mark.parametrize("height, expected", [(0.1, 0), (3.0, 1)])

@@ -13,6 +13,8 @@ import scipy.sparse as sp
 from softtact.fem.elements import HEX20
 from softtact.fem.extruded_mesh import grid_mesh_2d
 
+# Derivatives of the shape functions at the points of both rules and at the corners.
+_SLOPES = HEX20.shape(np.vstack([HEX20.reduced.points, HEX20.quadrature.points, HEX20.nodes[:HEX20.corners]]))[1]  # type: ignore[union-attr]
 _ROUNDS = 20   # masters of hanging nodes may hang themselves; each round resolves one level
 
 
@@ -49,6 +51,19 @@ class CoverMesh:
         """Free points on the lower side."""
         nodes = np.unique(self.bottom)
         return nodes[nodes < self.free]
+
+    def least_volume_ratio(self, displacement: np.ndarray) -> float:
+        """Least deformed over undeformed volume, at integration points and corners of the elements.
+
+        displacement (n, 3) in mm, of the free points first. An element is folded where it is 0 or less, which quadrature does not
+        see at a corner; nan without elements.
+        """
+        if not len(self.hexes):
+            return np.nan
+        moved = self.points + self.follow @ displacement[:self.free]
+        rest, deformed = (np.linalg.det(np.einsum("emi,gmj->egij", points[self.hexes], _SLOPES, optimize=True))
+                          for points in (self.points, moved))
+        return float((deformed / rest).min())
 
     def masters(self) -> tuple[np.ndarray, np.ndarray]:
         """Master nodes (n, w) of each point and their weights (n, w); unused entries have weight 0."""

@@ -126,6 +126,7 @@ class _Record:
         points = np.where(numbers["pad_force_n"] > 0, numbers.pop("points"), np.inf)
         flags = flags_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                    contact_error_mm=numbers.pop("contact_error_mm"), points=points, rough=numbers.pop("rough"),
+                                   volume_ratio=numbers["least_volume_ratio"],
                                    frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                    allowed_mm=sensor.solver.largest_penetration_mm)
         made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(times),
@@ -161,6 +162,7 @@ def _read_load_step(body, maps, load_step, *, from_mm):
             "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
             "points": np.count_nonzero(top.under_pressure(slab)),
             "frustum_compression_mm": body.support.largest_compression(support.displacement), "residual_n": load_step.residual_n,
+            "least_volume_ratio": body.slab.cover_mesh.least_volume_ratio(slab.displacement),
             "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations,
             "rough": load_step.rough, "pressure": _pressure(top, slab)}
 

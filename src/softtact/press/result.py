@@ -77,6 +77,9 @@ class PressResult:
     """(step,) in N: largest unbalanced nodal force; nan where the model does not give it."""
     extrapolated_volume_fraction: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'; or nan."""
+    least_volume_ratio: np.ndarray | None = field(default=None, metadata=_array("1", "step") | _LATER)
+    """(step,) of the hyperelastic model: least deformed over undeformed volume of the cover, over the integration points and
+    corners of its elements; 0 or less where one is folded under an edge. None of other models."""
     iterations: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) iterations of the solver."""
     converged: np.ndarray = field(metadata=_array("1", "step"))

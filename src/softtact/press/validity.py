@@ -79,12 +79,14 @@ def flags_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustu
 
 
 def flags_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarray, points: np.ndarray, depth_mm: np.ndarray,
-                       rough: np.ndarray, forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> Flags:
-    """Flags of a hyperelastic press, by compression, contact error, residual and growth of depth.
+                       rough: np.ndarray, forces_n: np.ndarray, volume_ratio: np.ndarray, frustum_mm: float,
+                       allowed_mm: float) -> Flags:
+    """Flags of a hyperelastic press, by compression, contact error, residual, folding and growth of depth.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure; `allowed_mm` is the tolerance for it
     points (l,): number of the cover's points that carry the object;  compression_mm, frustum_mm: nan without frusta
     rough (l,): whether the residual is above the tolerance;  forces_n (l,): depths must grow where these do
+    volume_ratio (l,): the least of the cover's elements, their corners included; nan without a cover
     """
     full, overlap = FULL_POCKET * frustum_mm, _OVERLAP_LEFT * allowed_mm
     steady = (np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)
@@ -94,6 +96,7 @@ def flags_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarr
                 ~(contact_error_mm < overlap),
             f"fewer than {_FEWEST_POINTS} points of the cover carry the object, which is finer than the mesh":
                 points < _FEWEST_POINTS,
+            "an element of the cover is folded at a corner: an edge of the object is sharper than the mesh": volume_ratio <= 0,
             "frusta fold on under the same force, and the residual is above its tolerance": rough,
             "the depth does not grow with the force: two load steps are different equilibria": ~steady & np.ones(len(points), bool)}
 
