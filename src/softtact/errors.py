@@ -66,6 +66,10 @@ class NarrowPartWarning(UserWarning):
     """An object has parts that are narrower than the distance of a model's points."""
 
 
+class CrushedWarning(UserWarning):
+    """A press by the hyperelastic model will compress frusta until their pockets are full."""
+
+
 class FrameWarning(UserWarning):
     """A camera frame, or a mask, may not meet the assumptions of what reads it."""
 
