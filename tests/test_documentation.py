@@ -22,7 +22,7 @@ from simulated_recordings import HiddenConstants, simulate_recording, staircase_
 import softtact
 from softtact.calibration.ladder import Presses
 from softtact.cli import main
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import cylinder
 from softtact.imaging.frames import Camera, render_frame
 from softtact.learning.network import TactileNetwork, save_network

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from softtact.errors import SofttactError
-from softtact.fem.mesh_files import read_body
+from softtact.fem.files.solids import read_body
 from softtact.geometry.repair import read_mended
 from softtact.learning.network import load_network
 from softtact.learning.prediction import read_maps

@@ -14,7 +14,7 @@ import openpyxl
 import pytest
 
 from softtact.errors import InputError
-from softtact.fem.mesh_files import read_mesh_file
+from softtact.fem.files.solids import read_mesh_file
 from softtact.files import read_arrays, read_dataset, read_json, read_yaml
 from softtact.geometry.meshes import read_mesh
 from softtact.imaging.marker_motion import MarkerMotion

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from softtact.cli import main
-from softtact.fem.mesh_files import read_mesh_file
+from softtact.fem.files.solids import read_mesh_file
 from tests.support.element_files import hexahedra, inp_assembly, inp_part
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)

@@ -14,7 +14,7 @@ from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.decks.solid import export_solid
 from softtact.errors import InputError
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box, cylinder, in_tetrahedra
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody

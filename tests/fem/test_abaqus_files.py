@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.fem.mesh_files import read_body
+from softtact.fem.files.solids import read_body
 from tests.support.element_files import (
     BLOCK_MM3,
     TETRAHEDRA,

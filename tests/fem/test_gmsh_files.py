@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.fem.gmsh_files import read_gmsh
-from softtact.fem.mesh_files import read_body
+from softtact.fem.files.gmsh import read_gmsh
+from softtact.fem.files.solids import read_body
 from tests.support.element_files import BLOCK_MM3, block, hexahedra, msh22, msh41, quadratic, skin
 
 NODES, TETRA = block()

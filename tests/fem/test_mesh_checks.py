@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError, MeshWarning
-from softtact.fem.mesh_files import read_body, read_mesh_file
+from softtact.fem.files.solids import read_body, read_mesh_file
 from tests.support.element_files import BLOCK_MM3, TETRAHEDRA, WEDGES, cut, hexahedra
 
 NODES, HEXES = hexahedra()

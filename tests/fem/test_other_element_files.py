@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.fem.mesh_files import read_body, write_mesh
+from softtact.fem.files.solids import read_body, write_mesh
 from softtact.fem.structured_meshes import box
 from tests.support.element_files import BLOCK_MM3, block, hexahedra, skin
 

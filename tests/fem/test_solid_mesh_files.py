@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.fem.mesh_files import read_mesh_file, write_mesh
+from softtact.fem.files.solids import read_mesh_file, write_mesh
 from softtact.fem.quadratic_nodes import raised
 from softtact.fem.structured_meshes import box
 

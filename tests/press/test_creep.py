@@ -12,7 +12,7 @@ import softtact
 from softtact.cli import main
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.materials.inelastic import Inelastic
 from softtact.materials.laws.registry import make_law

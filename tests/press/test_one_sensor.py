@@ -11,7 +11,7 @@ import yaml
 import softtact
 from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, InputError
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import elastic_compliance

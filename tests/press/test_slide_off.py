@@ -8,7 +8,7 @@ import yaml
 import softtact
 from softtact.cli import main
 from softtact.errors import ConvergenceError
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.models.solid.newton import _solved
 

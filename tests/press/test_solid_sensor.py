@@ -11,7 +11,7 @@ import softtact
 from softtact.cli import main
 from softtact.contact.motion import Motion
 from softtact.errors import InputError, TimeLimitError
-from softtact.fem.mesh_files import write_mesh
+from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.press.kinds import solid_at_rest

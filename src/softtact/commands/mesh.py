@@ -84,7 +84,7 @@ def _complexity(options):
 
 
 def _mesh(options):
-    from softtact.fem.mesh_files import write_mesh
+    from softtact.fem.files.solids import write_mesh
     from softtact.geometry.formats import SURFACES
 
     check_outputs(options.out)
@@ -106,7 +106,7 @@ def _mesh(options):
 def _filled(options, rules):
     """The mesh of a surface, and the values to report."""
     from softtact.fem.body_mesh import MOST_ELEMENTS, meshed_body
-    from softtact.fem.mesh_files import face_rule, with_named_faces
+    from softtact.fem.files.solids import face_rule, with_named_faces
     from softtact.geometry.tetrahedra import estimated_elements
 
     if len(options.region or ()) > 1:
@@ -133,7 +133,7 @@ def _filled(options, rules):
 
 def _taken(options, rules):
     """The mesh of a file of elements, and the values to report."""
-    from softtact.fem.mesh_files import read_body
+    from softtact.fem.files.solids import read_body
 
     for name in ("size", "envelope", "most_elements"):
         if getattr(options, name) is not None:

@@ -18,7 +18,7 @@ from softtact.contact.pair import ContactPair
 from softtact.contact.surface_places import places
 from softtact.contact.surfaces import Surface, quadrature_points
 from softtact.errors import InputError
-from softtact.fem.mesh_files import read_mesh_file, with_named_faces
+from softtact.fem.files.solids import read_mesh_file, with_named_faces
 from softtact.fem.solid_mesh import SolidMesh, fine_triangles
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose

@@ -18,7 +18,7 @@ import numpy as np
 
 from softtact.checksums import checked
 from softtact.errors import InputError
-from softtact.fem.mesh_files import check_mesh_file, write_mesh
+from softtact.fem.files.solids import check_mesh_file, write_mesh
 from softtact.files import atomic_path
 from softtact.inputs import in_one_sentence
 from softtact.models.solid.result import SolidFields

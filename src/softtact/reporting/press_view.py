@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.mesh_files import check_mesh_file, read_mesh_file
+from softtact.fem.files.solids import check_mesh_file, read_mesh_file
 from softtact.fem.solid_mesh import outer_triangles
 from softtact.files import atomic_path, read_dataset
 from softtact.inputs import in_one_sentence

@@ -19,12 +19,12 @@ import numpy as np
 
 from softtact.checksums import check
 from softtact.errors import InputError, MeshWarning
-from softtact.fem.abaqus_files import read_abaqus
-from softtact.fem.gmsh_files import read_gmsh
-from softtact.fem.mesh_checks import refuse_faulty, remarks_on_pieces
-from softtact.fem.meshio_files import FACE, GEOMETRY, REGION, read_other
+from softtact.fem.files.abaqus import read_abaqus
+from softtact.fem.files.by_meshio import FACE, GEOMETRY, REGION, read_other
+from softtact.fem.files.checks import refuse_faulty, remarks_on_pieces
+from softtact.fem.files.gmsh import read_gmsh
+from softtact.fem.files.raw_mesh import FACET_CORNERS, RawMesh, corners_of
 from softtact.fem.quadratic_nodes import QUADRATIC, raised
-from softtact.fem.raw_mesh import FACET_CORNERS, RawMesh, corners_of
 from softtact.fem.solid_mesh import ELEMENTS, SolidMesh
 from softtact.files import atomic_path
 from softtact.geometry.meshes import UNIT_MM

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.raw_mesh import Flags, RawMesh, dimension_of
+from softtact.fem.files.raw_mesh import Flags, RawMesh, dimension_of
 
 # Number of Gmsh's element type: meshio's name, number of nodes, and where nodes differ in order, Gmsh's in that of VTK.
 _HEX20 = [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softtact.errors import InputError
-from softtact.fem.raw_mesh import FACET_CORNERS
+from softtact.fem.files.raw_mesh import FACET_CORNERS
 from softtact.fem.solid_mesh import ELEMENTS, SolidMesh, flat_triangles
 
 # Simplices that make up an element, among its corners in VTK's order.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.raw_mesh import Flags, RawMesh, dimension_of
+from softtact.fem.files.raw_mesh import Flags, RawMesh, dimension_of
 from softtact.inputs import in_one_sentence
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.abaqus_deck import Deck, ElementSet, ElementSurface
-from softtact.fem.raw_mesh import Flags, RawMesh, corners_of, dimension_of, side_corners
+from softtact.fem.files.abaqus_deck import Deck, ElementSet, ElementSurface
+from softtact.fem.files.raw_mesh import Flags, RawMesh, corners_of, dimension_of, side_corners
 
 
 @dataclass

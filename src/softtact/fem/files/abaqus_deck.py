@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.abaqus_keywords import Block, fields, read_blocks
+from softtact.fem.files.abaqus_keywords import Block, fields, read_blocks
 
 _BODY = re.compile(r"(C3D|CPE|CPEG|CPS|CAX|CGAX)(\d+)[RHIMSTPE]*")
 _FACET = re.compile(r"(?:S|M3D|R3D|SFM3D|DS|STRI)(3|4|65?|8|9)(?:[RHTSW]+|5|R5|RT)?")
