@@ -197,14 +197,15 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert 'href="sources.html#config"' in page
     assert "pad: 30 x 20 mm. It is not the paper" in page
     for first, then in itertools.pairwise([
-            "Not trained: the printed network.", "What is not here", "No robot and no gripper", "the draft one of the hyper model",
+            "What was asked", "Not trained: the printed network.", "How sure this is", "No robot and no gripper",
+            "the draft one of the hyper model",
             'id="figures"', 'id="result"', 'id="tables"', "Table 3. Time", 'id="claims"', 'id="run"']):
         assert 0 <= page.index(first) < page.index(then), then
     assert "mean training reading at that force" in page and "skill over the best trivial predictor" in page
     assert "mae_counts" not in page
     assert "0.500 to 0.700" in page and "one item: none" in page
     assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
-    assert "a &lt; b" in page and "What is synthetic here" in page
+    assert "a &lt; b" in page and "What is synthetic" in page
     assert "another mesh, friction, scatter" in page
     facts["config"]["models"]["felt"]["friction"] = None
     assert "another mesh, scatter" in render_page(inputs, facts, folder=folder, run=NO_RUN)

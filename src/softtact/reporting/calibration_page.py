@@ -22,14 +22,16 @@ def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[s
     problem = result.problem
     noise = np.mean([one.noise_counts for one in problem.experiments])
     page = Page("Calibration of a sensor", problem.presses.sensor.spec.name, folder=Path(path).parent)
-    page.text(f"From {'; '.join(one.name for one in problem.experiments)}, by the {problem.presses.model} model. The misfit is "
-              f"{result.misfit:.2f} times the noise ({noise:.1f} counts a reading).")
-    page.box("What these presses leave open.", result.not_identifiable)
-    page.box("What was left out.", notes)
-    page.section("What was found", anchor="found")
+    page.opening(
+        asked="Which numbers of the sensor, and which places of the objects, give the recorded counts? From "
+              f"{'; '.join(one.name for one in problem.experiments)}, by the {problem.presses.model} model.",
+        found=f"The calibrated sensor misses the recorded counts by {result.misfit:.2f} times the noise ({noise:.1f} counts a "
+              "reading).",
+        sure=["A misfit beyond noise counts as noise in the standard deviations. The error of the model is in them, too: from "
+              f"these misfits and what is known of it, {100 * result.model_error:.1f} % of a map.",
+              *(f"These presses leave open: {sentence}" for sentence in result.not_identifiable), *notes])
+    page.section("The numbers", anchor="found")
     page.table(pd.DataFrame(_rows(result), columns=["number", "value", "standard deviation"]))
-    page.text("A misfit beyond noise counts as noise in these deviations. The error of the model is in them, too: from these "
-              f"misfits and what is known of it, {100 * result.model_error:.1f} % of a map.")
     page.section("Figures")
     for caption, figure in (
             ("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's validity, "

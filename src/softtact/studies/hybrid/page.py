@@ -1,10 +1,9 @@
 """report.html: one file with the figures inside, and links from each to its data, its code and the configuration.
 
-The box at its head states the differences between the study and the paper.
+Its head states what was found, and the differences between the study and the paper.
 """
 
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import pandas as pd
 from softtact.evaluation.score_tables import ALL_FORCES, forces_of
 from softtact.files import read_csv, read_json
 from softtact.published.archive import MAPS_OF_SETS
-from softtact.reporting.page import Page
+from softtact.reporting.page import Page, counted
 from softtact.reporting.run_record import run_sentence
 from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words
 
@@ -57,6 +56,8 @@ TITLES = {"summary": "Scores with their 95 % interval, by set",
           "table2": "Table 2. Complexity and choice of model",
           "counts": "The archive's counts against those in print",
           "table3": "Table 3. Time per tactile map"}
+_QUESTION = ("Does choosing between an elastic and a hyperelastic model by an object's complexity give what a soft tactile sensor "
+             "reads, in less time than the hyperelastic model alone?")
 _MODULE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
               "counts": "import_published", "summary": "evaluate", "gains": "limits", "limits": "limits",
               "seeds": "retraining"}     # others: make_tables
@@ -79,18 +80,19 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     ftir = read_json(inputs["ftir"])
     archive = read_json(inputs["inventory"]) if "inventory" in inputs else None
     page = Page("Simulating a soft tactile sensor: the study", settings["study"], folder=folder)
-    for sentence in read_json(inputs["verdicts"])["sentences"]:
-        (partial(page.box, "") if sentence.startswith("Not trained") else page.text)(sentence)
-    page.box("What is not here.", missing(settings, archive=archive is not None))
-    page.box("What is synthetic here.", _synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings))
-    page.text(_archive_facts(settings, archive) if archive else _facts(settings))
-    if "gains" in inputs:
-        page.text(range_end_sentence(read_csv(inputs["gains"]), settings["config"]))
+    claims = read_csv(inputs["claims"], keep_default_na=False)
+    page.opening(
+        asked=[_QUESTION, _archive_facts(settings, archive) if archive else _facts(settings)],
+        found=[*((sentence, inputs["scores"]) for sentence in read_json(inputs["verdicts"])["sentences"]),
+               (counted(claims), inputs["claims"])],
+        sure=[*missing(settings, archive=archive is not None),
+              (range_end_sentence(read_csv(inputs["gains"]), settings["config"]), inputs["gains"]) if "gains" in inputs else ""],
+        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings))
     for text, anchor in (("Configuration", "config"), ("Code", "code")):
         page.other_page(text, f"{SOURCES_PAGE}#{anchor}")
     _show_figures(page, inputs["figures"], settings["sources"], {"fig5_ftir": ftir["verdict"]})
     _show_tables(page, inputs)
-    page.claims(read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"],
+    page.claims(claims, file=inputs["claims"],
                 links=[_code("softtact/studies/hybrid/claims/table.py")])
     page.section("What was run, on what, how long", anchor="run")
     page.text(run_sentence(run))
@@ -160,15 +162,19 @@ _CONFIGURATION = ("", [("Configuration", f"{SOURCES_PAGE}#config")])
 
 
 def _facts(settings):
-    sets = (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))
-    pressed = [f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]:.3g} times"
-               for name, words in sets]
+    sets = (("indenters", "indenter"), ("unseen", "unseen indenter"), ("grasps", "object"))
+    pressed = [f"{_number(settings[name], word)} in {_number(settings['presses'][name], 'place')}, each read "
+               f"{_number(settings['trials'][name], 'time')}" for name, word in sets]
     forces = ", ".join(f"{force:g}" for force in settings["forces_n"])
     reader = "from recordings of a TSF-85 (tactile/)" if recorded(settings) else "by the virtual sensor"
     another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
     return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
             f"Pressed at {forces} N with each model and read {reader}: {'; '.join(pressed)}. "
             f"Seed {settings['seed']}.")
+
+
+def _number(count, word):
+    return f"{count:.3g} {word}{'' if count == 1 else 's'}"
 
 
 def _archive_facts(settings, archive):

@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 
 from softtact.files import read_csv
-from softtact.reporting.page import Page
+from softtact.reporting.page import Page, counted
 
 CAPTIONS = {
     "maps": "Maps of {shown} by the truths and the tested models, each with its own scale.",
@@ -29,22 +29,32 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     """
     tables = {name: read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items() if name != "figures"}
     page = Page("Does the paper's claim hold? The study", settings["study"], folder=outputs["page"].parent)
-    page.box("What is synthetic here.", "Truths are simulations with other laws, meshes and boundaries than the tested models; "
-             "readings are the virtual sensor's. No score here is the paper's.")
+    judged = tables["claims"]
+    page.opening(
+        asked="Does the hyperelastic model show detail that the elastic one loses, is that more than stiffness, and is a hybrid of "
+              "both as accurate for less time? Each model is compared with several truths, object by object.",
+        found=[(counted(judged), inputs["claims"]),
+               *(f"{one.claim}: {one.verdict}." for one in judged[judged["where"] != "control"].itertuples())],
+        sure=[*(f"{one.claim}: {one.verdict}." for one in judged[judged["where"] == "control"].itertuples()),
+              ("A difference counts only where its 95 % interval over objects and seeds is clear of its bound; the tests of one "
+               "claim share their level by Holm's rule.", inputs["hypotheses"]),
+              ("What the study could see at all was stated before the scores.", inputs["power"])],
+        synthetic="Truths are simulations with other laws, meshes and boundaries than the tested models; readings are the virtual "
+                  "sensor's. No score here is the paper's.")
     page.claims(tables["claims"], file=inputs["claims"])
     page.section("Hypotheses")
-    page.text("More is better in every difference. Intervals are those of 95 %; p_holm shares the level over all tests of a claim.")
+    page.text("More is better in every difference. Intervals are of 95 %; all tests of a claim share its level by "
+              "Holm's rule.")
     page.table(tables["hypotheses"], file=inputs["hypotheses"])
-    page.section("Figures")
     captions = [CAPTIONS[name].format(shown=settings["shown"].replace("_", " ")) for name in settings["names"]]
     page.figures(zip(inputs["figures"], captions, strict=True))
     page.section("Scores")
-    page.text("Means over objects and seeds. error_share: sum of the errors over the sum of the readings; ssim_own_range: data "
-              "range of each map; ssim_paper and ssim_paper_whole: the converter's range, with the smallest and the largest window "
-              "that fits, for the paper states none.")
+    page.text("Means over objects and seeds. Error over the mean reading: sum of the errors over the sum of the readings. SSIM "
+              "has either the range of each map, or the converter's with the smallest and the largest window that fits, for the "
+              "paper states none.")
     page.table(mean_scores(tables["scores"]), file=inputs["scores"])
     for name, title in _TITLES.items():
-        page.table(tables[name].head(_MOST_ROWS), title, file=inputs[name])
+        page.table(tables[name], title, file=inputs[name], most_rows=_MOST_ROWS)
     page.section("Configuration")
     page.code(settings["config"])
     page.write(outputs["page"])

@@ -84,15 +84,20 @@ def draw_one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
 def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the page.  inputs: table, claims, figures (list);  outputs: page;  settings: study, captions, config."""
-    from softtact.reporting.page import Page
+    from softtact.reporting.page import Page, counted
 
     grasps = read_csv(inputs["table"])
     page = Page("Grasps by a robot: the study", settings["study"], folder=outputs["page"].parent)
-    page.box("What is synthetic here.", "Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No "
-             "score here is the paper's.")
-    page.text(_result(grasps))
+    claims = read_csv(inputs["claims"], keep_default_na=False)
+    done, *care = _result(grasps)
+    page.opening(asked="What do the two sensors of a gripper read while a robot grasps objects in simulation, and does the paper's "
+                       "choice of a model hold there?",
+                 found=[(done, inputs["table"]), (counted(claims), inputs["claims"])],
+                 sure=care or "Every press is within what its model is valid for, and no taxel is at the end of its range.",
+                 synthetic="Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No score here is "
+                           "the paper's.")
     page.figures(zip(inputs["figures"], settings["captions"], strict=True))
-    page.claims(read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"])
+    page.claims(claims, file=inputs["claims"])
     page.section("Grasps")
     page.table(grasps[[name for name in _SHOWN if name in grasps]], file=inputs["table"],
                links=[("Each grasp in time", [("grasps", "grasps")])])
@@ -206,11 +211,11 @@ def _result(grasps):
     """Sentences on the number of successful grasps and on the validity of their models."""
     done = grasps[grasps.status == "done"]
     objects, trials = (done.object.nunique(), int(done.trials.sum())) if len(done) else (0, 0)
-    result = f"{len(done)} of {len(grasps)} grasps done, {objects} objects, {trials} trials."
+    result = [f"{len(done)} of {len(grasps)} grasps were done, of {objects} object{'s' * (objects != 1)}, with {trials} trials."]
     invalid = int((done[["valid_left", "valid_right"]] != 1).to_numpy().sum()) if len(done) else 0
     if invalid:
-        result += f" {invalid} presses at the grip are beyond what their model is valid for; their maps are not to be relied on."
+        result.append(f"{invalid} presses at the grip are beyond what their model is valid for: do not rely on their maps.")
     full = int((done[["at_range_end_left", "at_range_end_right"]] > 0).to_numpy().sum()) if len(done) else 0
     if full:
-        result += (f" In the readings of {full} pads taxels are at the end of the converter's range, and read less than they feel.")
+        result.append(f"In readings of {full} pads taxels are at the end of the converter's range: they read less than they feel.")
     return result

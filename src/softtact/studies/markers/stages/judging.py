@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from softtact.files import read_csv, read_json, write_csv
-from softtact.reporting.page import Page
+from softtact.reporting.page import Page, counted
 from softtact.studies.markers.claims import PRINTED_IMAGES, PRINTED_MARKERS, WORDS, claims_of_markers
 from softtact.studies.markers.judging import by_motion, by_object, sliding_verdicts
 from softtact.studies.markers.scoring import table_one, table_two
@@ -81,15 +81,21 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     }
     facts = read_json(inputs["facts"])
     page = Page("Marker images", settings["study"], folder=outputs["page"].parent)
-    page.box(
-        "What is synthetic here.",
-        "No real image of this sensor is here. The images that networks learn from, and are scored on, "
+    page.opening(
+        asked=[
+            "Which network makes the marker images of a gel from depth images best, and how near do they come to solved images?",
+            *_facts(facts, settings),
+        ],
+        found=[*_best_networks(tables["table1"], inputs["table1"]), (counted(tables["claims"]), inputs["claims"])],
+        sure=[
+            ("The solved images, their markers found by the same detector, are the floor of all errors.", inputs["table1"]),
+            "A claim is decided only where its 95 % interval over objects is clear of its limit.",
+        ],
+        synthetic="No real image of this sensor is here. The images that networks learn from, and are scored on, "
         "are our own: solved by the elastic model and drawn by the camera readout. A network can only come near that physics, "
-        "and no number here is the paper's. How far the physics itself is from real markers is told by `softtact stage "
-        "markers.compare_markers`, for anyone who has an image.",
+        "and no number here is the paper's. How far the physics itself is from real markers is told by softtact stage "
+        "markers.compare_markers, for anyone who has an image.",
     )
-    for sentence in _facts(facts, settings):
-        page.text(sentence)
     page.section("Tables I and II")
     page.text(
         "Means over the scored frames. d and error vectors are of images in which every marker was found. The solved images are "
@@ -107,7 +113,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.claims(tables["claims"], file=inputs["claims"])
     page.section("More tables")
     for name, title in _TITLES.items():
-        page.table(_worded(tables[name]).head(_MOST_ROWS), title, file=inputs[name])
+        page.table(_worded(tables[name]), title, file=inputs[name], most_rows=_MOST_ROWS)
     page.section("Configuration")
     page.code(settings["config"])
     page.write(outputs["page"])
@@ -125,6 +131,13 @@ def _worded(table: pd.DataFrame) -> pd.DataFrame:
     if "source" in table:
         table = table.assign(source=table.source.map(lambda name: WORDS.get(name, name)))
     return table.dropna(axis=1, how="all").rename(columns=heads | {"source": "images or markers of"})
+
+
+def _best_networks(table: pd.DataFrame, file: str) -> list[tuple[str, str]]:
+    """A sentence on the marker errors of all that make images, the least first, and the table's file."""
+    known = table.dropna(subset="d_px").sort_values("d_px")
+    shown = ", ".join(f"{WORDS.get(one.source, one.source)} {one.d_px:.3g} px" for one in known.itertuples())
+    return [(f"Sum of the position errors of all markers, d: {shown}.", file)] if shown else []
 
 
 def _facts(facts: dict[str, Any], settings: dict[str, Any]) -> list[str]:

@@ -22,6 +22,7 @@ _CAPTIONS = {
 _TITLES = {"slopes": "Slopes", "hardness": "Hardness over load and height", "variants": "Slopes under other assumptions",
            "lump_detection": "Least stiffness ratio of a lump that is seen",
            "lump_recovery": "Hidden lumps and what the films told of them"}
+_MEASURES = {"relative_hardness_n_mm": "The paper's relative hardness F/d", "apparent_modulus_mpa": "Our apparent modulus"}
 
 
 def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -35,10 +36,15 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     facts: dict[str, Any] = {"lump": {}} | {name: value for path in inputs["facts"] for name, value in read_json(path).items()}
     files = {path.stem: path for path in inputs["tables"]}
     page = Page("Palpation sensor", design.name, folder=outputs["page"].parent)
-    page.text(_conditions(design, facts))
-    page.box("What is assumed.", _assumptions(design))
-    for sentence in [*_on_hardness(facts["hardness"]), *_on_lumps(facts)]:
-        page.text(sentence)
+    page.opening(
+        asked=["Do the forces on the films tell how hard a tissue is, and where a lump hides in it?", _conditions(design)],
+        found=[*((sentence, files.get("hardness")) for sentence in _on_hardness(facts["hardness"])),
+               *((sentence, files.get("lump_recovery")) for sentence in _on_lumps(facts))],
+        sure=[*_beyond_data(facts), *_on_claims(files["claims"]),
+              *([("Slopes under other assumptions show what each of these is worth.", files["variants"])] if "variants" in files
+                else [])],
+        synthetic=["All forces and deflections are computed; no sensor and no tissue was measured.",
+                   *(f"Assumed: {sentence}." for sentence in _assumptions(design))])
     page.figures((path, _CAPTIONS[path.stem]) for path in inputs["figures"])
     page.tables(_TITLES, files)
     _show_claims(page, files["claims"])
@@ -59,14 +65,27 @@ def _show_claims(page: "Page", file: Path) -> None:
     page.text(NOT_JUDGED)
 
 
-def _conditions(design: PalpationDesign, facts: dict[str, Any]) -> str:
+def _on_claims(file):
+    """A sentence on the verdicts, if the study judges claims."""
+    from softtact.reporting.page import counted
+
+    claims = read_csv(file, keep_default_na=False)
+    return [(f"Beside the paper, by rules with intervals: {counted(claims)}", file)] if len(claims) else []
+
+
+def _beyond_data(facts):
+    """A sentence on regions strained beyond the data of their law, if there are any facts on it."""
+    beyond = facts["extrapolated_volume_fraction"]
+    return [] if beyond is None else [f"At worst {beyond:.0%} of a region is strained beyond its law's data."]
+
+
+def _conditions(design: PalpationDesign) -> str:
     """Model, interfaces and loads in sentences."""
-    model, beyond = design.model.replace("_", " "), facts["extrapolated_volume_fraction"]
+    model = design.model.replace("_", " ")
     return (f"{model[0].upper()}{model[1:]}, depth {design.geometry.depth:g} mm. Jaw {design.jaw}; tissue on beam: "
             f"{design.tissue_on_beam}; beam on base: {design.beam_on_base} (a number: friction of a unilateral interface). Loads "
             f"to {design.load_n.to:g} N by {design.load_n.by:g} N, jaw to {design.displacement_mm.to:g} mm by "
-            f"{design.displacement_mm.by:g} mm. " + ("" if beyond is None else
-                                                     f"At worst {beyond:.0%} of a region is strained beyond its law's data."))
+            f"{design.displacement_mm.by:g} mm.")
 
 
 def _assumptions(design: PalpationDesign) -> list[str]:
@@ -83,9 +102,9 @@ def _on_hardness(verdicts):
         heights = found["heights"]
         by_height = (f"with the tissue's height by up to {found['change_with_height']:.1%}" if heights > 1 else
                      "and was measured at one height of the tissue, which says nothing of others")
-        yield (f"{column}: changes with load by up to {found['change_with_load']:.1%}, {by_height}; hardest over softest tissue "
-               f"{found['contrast']:.2f} or more; tissues {'are' if found['apart'] else 'are not'} told apart at the loads and the "
-               f"{f'{heights} heights' if heights > 1 else 'one height'} that were tried.")
+        yield (f"{_MEASURES[column]}: changes with load by up to {found['change_with_load']:.1%}, {by_height}; hardest over "
+               f"softest tissue {found['contrast']:.2f} or more; tissues {'are' if found['apart'] else 'are not'} told apart at "
+               f"the loads and the {f'{heights} heights' if heights > 1 else 'one height'} that were tried.")
 
 
 def _on_lumps(facts):

@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 
 from softtact.files import read_csv, read_json, write_csv
-from softtact.reporting.page import Page
+from softtact.reporting.page import Page, counted
 from softtact.studies.real.claims import claims_of_real
 
 _CAPTIONS = {
@@ -33,16 +33,19 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
               if name not in ("figures", "facts", "gel")}
     facts, gel = [read_json(path) for path in inputs["facts"]], read_json(inputs["gel"])
     page = Page("Gels with a camera on measured data", settings["study"], folder=outputs["page"].parent)
-    page.box("What is measured, what is fitted.", [
-        *(f"Presses: {one['presses']} of {one['source']}{'' if one['measured'] else ' - synthetic, no measurement'}."
-          for one in facts),
-        "Force: moduli are fitted to the points that each row of the table names; all else is predicted.",
-        f"Markers: the gel (path {gel['path']}, distance {gel['distance_px']:.0f} px) is fitted to the first image; in other "
-        "images only the ball's place, depth and motion and the camera's shift are.",
-        "Shading: fitted to presses that are not among those of the scores; circles `found` use the held-out image itself to find "
-        "where the ball is, circles `labelled` do not. The wheel's table was fitted to all presses by its authors."])
+    judged = tables["claims"]
+    page.opening(
+        asked="Do the models of gels with a camera give the forces, the markers and the colours that were measured?",
+        found=[(counted(judged), inputs["claims"]),
+               *(f"{one.claim}: {one.ours} ({one.verdict})." for one in judged.itertuples())],
+        sure=["Force: moduli are fitted to the points that each row of the table names; all else is predicted.",
+              f"Markers: the gel (path {gel['path']}, distance {gel['distance_px']:.0f} px) is fitted to the first image; in other "
+              "images only the ball's place, depth and motion and the camera's shift are.",
+              "Shading: fitted to presses that are not among those of the scores; circles that are found use the held-out image "
+              "itself to find where the ball is, labelled ones do not. The wheel's table was fitted to all presses by its makers."],
+        synthetic=[f"{one['presses']} presses: {one['source']}{'' if one['measured'] else '; synthetic, no measurement'}."
+                   for one in facts])
     page.claims(tables["claims"], title="Claims", file=inputs["claims"])
-    page.section("Figures")
     page.figures((path, _CAPTIONS[name]) for path, name in zip(inputs["figures"], settings["names"], strict=True))
     page.section("Tables")
     page.table(tables["gel_force"][tables["gel_force"].fitted_to == "all"], "One modulus for all points", file=inputs["gel_force"])

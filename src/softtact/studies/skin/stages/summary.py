@@ -27,7 +27,7 @@ _TITLES = {
     "crosstalk": "Crosstalk and localisation against pitch",
     "modules": "Modules on the link",
     "main_effects": "Which share of each output's variance a factor explains alone (Sobol, over the search)",
-    "search": "Search over elastomer, thickness, radius and pitch (first 20 rows)",
+    "search": "Search over elastomer, thickness, radius and pitch",
     "convergence": "The authors' case on finer and finer meshes",
 }
 _MOST_ROWS = 20
@@ -54,9 +54,13 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     facts = _all_facts(inputs["facts"])
     write_json(outputs["summary"], {"skin": design.skin} | facts)
     page = Page("Robot skin", design.skin, folder=outputs["page"].parent)
-    page.text(_facts(design))
-    page.box("Read with care.", facts["remarks"])
-    page.box("", _result(design, facts))
+    page.opening(
+        asked=["What does this robot skin feel, which layer suits it best, and what does it weigh?", _facts(design)],
+        found=[(sentence, files.get(table)) for sentence, table in
+               ((_chosen(design, facts), "choice"), (_mapped(facts), "detection"), (_laid(facts), "modules"))],
+        sure=[*facts["remarks"], *_on_claims(files)],
+        synthetic="All readings are computed; no skin was built. Elastomers are as the papers measured them, the converter's stray "
+                  "is assumed.")
     loads = read_csv(files["loads"])
     page.figures((path, _caption(path, loads)) for path in inputs["figures"])
     page.tables(_TITLES, files, most_rows=_MOST_ROWS)
@@ -96,9 +100,12 @@ def _facts(design: SkinDesign) -> str:
             "floor bonded, sides free; Laplace's equation on the deformed mesh.")
 
 
-def _result(design, facts):
-    """The results in sentences."""
-    return " ".join(sentence for sentence in (_chosen(design, facts), _mapped(facts), _laid(facts)) if sentence)
+def _on_claims(files):
+    """A sentence on the verdicts, if the study judges claims."""
+    from softtact.reporting.page import counted
+
+    return [(f"Beside the papers, by rules: {counted(read_csv(files['claims'], keep_default_na=False))}",
+             files["claims"])] if "claims" in files else []
 
 
 def _chosen(design, facts):
