@@ -1,5 +1,7 @@
 """Walls and pins that are thinner than the grid's step: no reading depends on where they stand among the grid's points."""
 
+import warnings
+
 import numpy as np
 import pytest
 import trimesh
@@ -68,6 +70,14 @@ def test_a_pin_between_the_points_touches_the_nearest_one():
     pin.apply_translation([0.08, 0.68, 1.0])
     found = Underside(HeightField(pin), GRID).nodes(0.5)
     assert GRID.points[found.nodes] == pytest.approx(np.array([[0.0, 0.6]])) and found.gap == pytest.approx([0.0])
+
+
+def test_a_wall_between_all_samples_of_the_surface_is_pressed(sensor):
+    wall = trimesh.creation.box((3.0, 0.02, 2.0))
+    wall.apply_translation([0.0, 0.07, 1.0])
+    assert Underside(HeightField(wall), GRID).depth_on_springs(1.0, 1.0) == np.inf
+    with warnings.catch_warnings(action="ignore"):
+        assert sensor.press(wall, force_n=0.5, model="elastic", label="").contact_area_mm2[0] > 0
 
 
 def test_nothing_is_added_to_an_object_that_the_points_see():

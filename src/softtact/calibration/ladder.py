@@ -115,14 +115,12 @@ def with_cover(spec: SensorSpec, times: float) -> SensorSpec:
     Raises InputError if the shell would protrude above a thinner cover.
     """
     thickness = times * spec.cover.thickness_mm
-    update: dict[str, Any] = {"cover": spec.cover.model_copy(update={"thickness_mm": thickness})}
     if isinstance(spec.edge.held, SidesBelow):
         below = spec.edge.held.sides_below_mm + thickness - spec.cover.thickness_mm
         if below <= 0:
             raise InputError(f"{spec.name}: with a cover of {thickness:.3g} mm, which a fit of 'cover' needs, its shell would "
                              f"be {-below:.3g} mm higher than the cover (edge.held.sides_below_mm); leave 'cover' out of --fit.")
-        update["edge"] = spec.edge.model_copy(update={"held": SidesBelow(sides_below_mm=below)})
-    return spec.model_copy(update=update)
+    return spec.with_upper_layer(thickness)
 
 
 def uncalibrated(name_or_sensor: "str | Sensor") -> Sensor:

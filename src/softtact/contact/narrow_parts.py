@@ -23,15 +23,22 @@ def lowest_missed(surface: HeightField, grid: "NodeGrid", gap_mm: np.ndarray, be
 
     gap_mm (n,): heights that the nodes see, NO_CONTACT_MM for none;  below_mm: height from which on parts cannot touch
     """
+    places, nodes = along_edges_over(surface, grid, below_mm)
+    place, height = (places[:, :2] - grid.points[0]) / grid.step, places[:, 2]
+    missed = ~_seen(gap_mm.reshape(grid.shape), place, height, grid.step)
+    lowest = np.full(grid.count, NO_CONTACT_MM)
+    np.minimum.at(lowest, nodes[missed], height[missed])
+    return lowest
+
+
+def along_edges_over(surface: HeightField, grid: "NodeGrid", below_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (k, 3) along the edges of an object's facets below a height, over a grid; and the node (k,) nearest to each."""
     points = surface.along_edges(below_mm, _SPACING * grid.step.min())
     last = np.array(grid.shape[::-1]) - 1
     place = (points[:, :2] - grid.points[0]) / grid.step
     inside = ((place > -0.5) & (place < last + 0.5)).all(axis=1)
-    place, height = place[inside], points[inside, 2]
-    missed = ~_seen(gap_mm.reshape(grid.shape), place, height, grid.step)
-    lowest, (i, j) = np.full(grid.shape, NO_CONTACT_MM), np.rint(place[missed]).astype(int).T
-    np.minimum.at(lowest, (j, i), height[missed])
-    return lowest.ravel()
+    i, j = np.rint(place[inside]).astype(int).T
+    return points[inside], j * grid.shape[1] + i
 
 
 def _seen(gap, place, height, step):

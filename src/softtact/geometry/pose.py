@@ -4,6 +4,7 @@ A drawn pose turns the object about z by any angle at which its pressing part fi
 puts it anywhere in the remaining space. It does not tilt the object.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -65,6 +66,18 @@ class Pose:
     def apply(self, points: np.ndarray) -> np.ndarray:
         """Points (n, 3) in mm of the mesh, in the sensor frame."""
         return self.rotation.apply(points) + self.translation_mm
+
+    def rates(self, points: np.ndarray) -> np.ndarray:
+        """Velocities (6, n, 3) of an object's points (n, 3) in mm, in the sensor frame, by the pose's six numbers (`from_values`).
+
+        In mm per mm by x, y, z, and in mm per degree by rx, ry, rz. Where ry is 90 degrees, rx and rz turn about the same axis.
+        """
+        with warnings.catch_warnings(action="ignore", category=UserWarning):      # of that angle, at which rz is taken as 0
+            _, ry, rz = self.rotation.as_euler("xyz")
+        last, middle = Rotation.from_euler("z", rz), Rotation.from_euler("y", ry)
+        axes = np.stack([(last * middle).apply([1.0, 0.0, 0.0]), last.apply([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]])
+        turned = np.radians(np.cross(axes[:, None], points - self.translation_mm))
+        return np.concatenate([np.broadcast_to(np.eye(3)[:, None], turned.shape), turned])
 
 
 def draw_poses(triangles: np.ndarray, *, count: int, footprint_mm: tuple[float, float],

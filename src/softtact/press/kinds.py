@@ -13,7 +13,7 @@ import trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
-from softtact.geometry.meshes import check_over_sensor, place
+from softtact.geometry.meshes import check_over_sensor, default_pose, place
 from softtact.linalg.workers import threads_of_blas
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
@@ -23,6 +23,7 @@ from softtact.press import choice
 from softtact.press.creep import at_times, refuse_creep, slow_press
 from softtact.press.fast import press_elastic_motion
 from softtact.press.gel import press_gel
+from softtact.press.gradient import Origin
 from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.making import layered_surface
 from softtact.press.objects import placed_object
@@ -136,10 +137,11 @@ def _by_forces(sensor, task, press, *, threads=1):
         task, complete = replace(task, motion=slow), partial(at_times, load_step=load_step, effective_n=effective_n, motion=motion)
     forces = checked_forces(task.motion.forces_n, sensor.spec.force_range_n, sensor.spec.name)
     placed, finish = _placed(sensor, task)
+    origin = Origin(sensor, placed, task.pose or default_pose(task.pressed))
 
     def finished(result: PressResult) -> PressResult:
         result = finish(choice.with_expected_error(sensor, result))
-        return complete(result) if complete else result
+        return complete(result) if complete else replace(result, origin=origin)
 
     task.control.reached.finish = finished
     # With more threads, dense products of some hundred rows wait for each other and take up to five times as long.

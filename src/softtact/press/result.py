@@ -7,7 +7,7 @@ called `reading_NAME`, and its dimensions and coordinates end in `_of_NAME`. The
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
+    from softtact.press.gradient import Gradient, Origin
 
 
 _ABSENT: Any = None      # a field that a sensor or a model does not have
@@ -141,6 +142,8 @@ class PressResult:
     """Fields of the solids, of a press by the solid model: mesh, nodal displacement, stress, contact pressure, loads of frames."""
     placed_object: PlacedObject | None = None
     """The object where it is at each load step, where `Sensor.press` was asked to keep it; it is written with the maps."""
+    origin: "Origin | None" = field(default=None, repr=False, compare=False)
+    """The sensor and the object of a press by forces, for `gradient`; neither written with the maps nor sent to other processes."""
 
     def __post_init__(self) -> None:
         steps, down = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
@@ -168,6 +171,9 @@ class PressResult:
         if solid is None or name.startswith("_") or not hasattr(solid, name):
             raise AttributeError(f"this {type(self).__name__} has no {name!r}")
         return getattr(solid, name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"origin": None}      # whose sensor holds hundreds of megabytes
 
     @property
     def steps(self) -> int:
@@ -218,6 +224,18 @@ class PressResult:
             raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic', or a "
                              "soft object, and keep_body=True.")
         return self.bodies[load_step]
+
+    def gradient(self, of: str = "tactile_map", by: str | Sequence[str] = ("pose", "force")) -> "Gradient":
+        """Derivatives of the settled contact: a `Gradient` of `of` by each parameter of `by`, at each load step.
+
+        of: tactile_map, deformation_map or depth (`indentation_mm`)
+        by: pose (x, y in mm and rx, ry, rz in degrees, as in `Pose.from_values`), force (N), young, thickness
+        Of presses by force with the elastic or the foundation model. Raises InputError for others, where the object touches nothing
+        or rests on the shell, and for unknown names.
+        """
+        from softtact.press import gradient
+
+        return gradient.gradient(self, of, [by] if isinstance(by, str) else by)
 
     def plot(self, path: str | Path | None = None, *, full_scale: bool = False) -> "Figure":
         """A matplotlib figure of maps and taxels at each load step; written to `path` (PNG or SVG) where one is given.

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 EPSILON_0_PF_PER_MM = 8.8541878128e-3
+COUNTS_PER_RELATIVE_CHANGE = 1000.0     # of an ideal readout
 _LEAST_GAP = 0.02         # of the dielectric's thickness, so that the plates never meet
 _SLICES, _STATES = 400, 2001
 _DISPLACEMENTS = 4001     # among which one of a given capacitance is interpolated: it is within 1e-7 mm
@@ -61,6 +62,26 @@ def equivalent_air_gap(spec: "AnySpec", displacement_mm: float | np.ndarray) -> 
     return (h - moved) * share + d.sheet_thickness_mm / d.relative_permittivity
 
 
+def air_gap_rate(spec: "AnySpec", displacement_mm: np.ndarray) -> np.ndarray:
+    """Derivative (mm per mm, any shape) of `equivalent_air_gap` by the displacement; 0 where the plates are as near as they get."""
+    d: Any = spec.dielectric
+    most = (1 - _LEAST_GAP) * spec.dielectric_thickness_mm
+    moved = np.minimum(displacement_mm, most)
+    if np.isnan(spec.frustum_height_mm):
+        rate = np.full_like(moved, -1 / d.relative_permittivity)
+    else:
+        h, (stretch, share) = d.frusta.height_mm, _pocket(d.frusta, d.relative_permittivity)
+        at = 1 - moved / h
+        rate = -np.interp(at, stretch, share) - (1 - moved / h) * table_slope(at, stretch, share)
+    return np.where(displacement_mm < most, rate, 0.0)
+
+
+def table_slope(at: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Derivative (any shape) of `numpy.interp(at, x, y)` by `at`: that of the piece, and 0 beyond the ends."""
+    piece = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+    return np.where((at >= x[0]) & (at <= x[-1]), (np.diff(y) / np.diff(x))[piece], 0.0)
+
+
 def capacitance_per_area(spec: "AnySpec", displacement_mm: float | np.ndarray) -> np.ndarray:
     """Capacitance in pF/mm2 where the electrode plane moved towards the PCB by `displacement_mm` (any shape)."""
     return EPSILON_0_PF_PER_MM / equivalent_air_gap(spec, displacement_mm)
@@ -73,17 +94,28 @@ def felt_displacement(spec: "AnySpec", displacement_mm: np.ndarray) -> np.ndarra
     Its capacitance is the surroundings' mean, weighted by the point's hat function: Simpson's rule, a third of it and each
     neighbour. The surface over a thin wall is steep; at the map's points alone it would read what happens to be there.
     """
-    felt = 1 / equivalent_air_gap(spec, displacement_mm)
+    table = felt_table(spec, displacement_mm)
+    return np.interp(around(1 / equivalent_air_gap(spec, displacement_mm)), *table)
+
+
+def around(values: np.ndarray) -> np.ndarray:
+    """Means (..., ny, nx) around the map's points of values (..., 2 ny - 1, 2 nx - 1) at half its steps, by Simpson's rule."""
     for axis in (-2, -1):
-        line = np.moveaxis(felt, axis, 0)
+        line = np.moveaxis(values, axis, 0)
         inner = (line[1:-2:2] + line[2:-1:2] + line[3::2]) / 3
         ends = [(line[:1] + 2 * line[1:2]) / 3, (line[-1:] + 2 * line[-2:-1]) / 3]
-        felt = np.moveaxis(np.concatenate([ends[0], inner, ends[1]]), 0, axis)
+        values = np.moveaxis(np.concatenate([ends[0], inner, ends[1]]), 0, axis)
+    return values
+
+
+def felt_table(spec: "AnySpec", displacement_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Inverses of equivalent air gaps (t,), rising, and the displacements (t,) in mm that have them, for `felt_displacement`."""
     table = np.linspace(min(0.0, displacement_mm.min()), (1 - _LEAST_GAP) * spec.dielectric_thickness_mm, _DISPLACEMENTS)
-    return np.interp(felt, 1 / equivalent_air_gap(spec, table), table)
+    return 1 / equivalent_air_gap(spec, table), table
 
 
-def ideal_counts(spec: "AnySpec", deformation_map_mm: np.ndarray, *, counts_per_relative_change: float = 1000.0) -> np.ndarray:
+def ideal_counts(spec: "AnySpec", deformation_map_mm: np.ndarray, *,
+                 counts_per_relative_change: float = COUNTS_PER_RELATIVE_CHANGE) -> np.ndarray:
     """Counts (..., rows, columns) of an ideal readout: proportional to dC / C0, limited to the converter's range."""
     rest = capacitance_per_area(spec, 0.0)
     change = taxel_means(spec, capacitance_per_area(spec, deformation_map_mm)) / rest - 1

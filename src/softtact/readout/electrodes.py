@@ -63,6 +63,11 @@ def edge_excess(side_mm: float, gap_mm: np.ndarray) -> np.ndarray:
     return gap_mm / (np.pi * side_mm) * (1 + np.log(2 * np.pi * side_mm / gap_mm))
 
 
+def edge_excess_rate(side_mm: float, gap_mm: np.ndarray) -> np.ndarray:
+    """Derivative of `edge_excess` by the gap, in 1/mm."""
+    return np.log(2 * np.pi * side_mm / gap_mm) / (np.pi * side_mm)
+
+
 def fringe_factor(spec: "BaseSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0.0, outer: float = 1.0,
                   inner: float = 0.0) -> np.ndarray:
     """Factors (..., rows, columns) of the taxels' capacitance for gaps (..., rows, columns) in mm.
@@ -70,11 +75,22 @@ def fringe_factor(spec: "BaseSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0
     The two pairs of edges add up. Palmer multiplies them, which is 3 to 6 % above the field of square plates, the sum 1.5 %.
     outer, inner: share of `edge_excess` for an edge on the sensor's border, and for one with a neighbour (1: as without neighbour)
     """
+    return 1 + _over_edges(edge_excess, spec, gap_mm, spacing_mm, outer, inner)
+
+
+def fringe_rate(spec: "BaseSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0.0, outer: float = 1.0,
+                inner: float = 0.0) -> np.ndarray:
+    """Derivatives (..., rows, columns) of `fringe_factor` by the gaps, in 1/mm."""
+    return _over_edges(edge_excess_rate, spec, gap_mm, spacing_mm, outer, inner)
+
+
+def _over_edges(excess, spec, gap_mm, spacing_mm, outer, inner):
+    """The sum over an electrode's two pairs of edges of an excess, weighted by the edges' shares."""
     sides = electrode_sides(spec, spacing_mm=spacing_mm)
     taxels = spec.need_taxels("the field at electrodes' edges")
     along_x = _edge_share(taxels.columns, outer, inner)[None, :]
     along_y = _edge_share(taxels.rows, outer, inner)[:, None]
-    return 1 + along_x * edge_excess(sides[0], gap_mm) + along_y * edge_excess(sides[1], gap_mm)
+    return along_x * excess(sides[0], gap_mm) + along_y * excess(sides[1], gap_mm)
 
 
 def _edge_share(count, outer, inner):

@@ -17,6 +17,7 @@ from softtact.sensors.fields import (
     FiniteSection,
     Relaxation,
     Sides,
+    SidesBelow,
     Taxels,
 )
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
@@ -141,6 +142,23 @@ class BaseSpec(Specification):
     @property
     def thickness_mm(self) -> float:
         """Height of the sensing surface over the lower side: over the PCB, where the sensor lies on it."""
+        raise NotImplementedError
+
+    @property
+    def upper_layer_mm(self) -> float:
+        """Thickness of the upper layer."""
+        raise NotImplementedError
+
+    def with_upper_layer(self, thickness_mm: float) -> Self:
+        """The sensor with another thickness of its upper layer, in the same shell: a thicker one protrudes further."""
+        update = self._of_upper_layer(thickness_mm)
+        if isinstance(self.edge.held, SidesBelow):
+            below = self.edge.held.sides_below_mm + thickness_mm - self.upper_layer_mm
+            update["edge"] = self.edge.model_copy(update={"held": SidesBelow(sides_below_mm=below)})
+        return self.model_copy(update=update)
+
+    def _of_upper_layer(self, thickness_mm: float) -> dict[str, Any]:
+        """The changed fields of a sensor with another thickness of its upper layer."""
         raise NotImplementedError
 
     @property

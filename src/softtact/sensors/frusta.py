@@ -67,6 +67,14 @@ class SensorSpec(BaseSpec):
         return self.dielectric_thickness_mm + self.cover.thickness_mm
 
     @property
+    def upper_layer_mm(self) -> float:
+        """Thickness of the cover."""
+        return self.cover.thickness_mm
+
+    def _of_upper_layer(self, thickness_mm: float) -> dict[str, Any]:
+        return {"cover": self.cover.model_copy(update={"thickness_mm": thickness_mm})}
+
+    @property
     def dielectric_thickness_mm(self) -> float:
         """Height of the electrode plane (top of the dielectric) over the PCB."""
         return self.dielectric.frusta.height_mm + self.dielectric.sheet_thickness_mm

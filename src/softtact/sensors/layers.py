@@ -72,6 +72,14 @@ class LayersSpec(BaseSpec):
         return sum(layer.thickness_mm for layer in self.layers)
 
     @property
+    def upper_layer_mm(self) -> float:
+        """Thickness of the cover, or of the only layer."""
+        return self.layers[-1].thickness_mm
+
+    def _of_upper_layer(self, thickness_mm: float) -> dict[str, Any]:
+        return {"layers": (*self.layers[:-1], self.layers[-1].model_copy(update={"thickness_mm": thickness_mm}))}
+
+    @property
     def dielectric_thickness_mm(self) -> float:
         """Height of the electrode plane (top of the dielectric) over the lower side."""
         return self.dielectric.thickness_mm

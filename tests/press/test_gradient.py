@@ -1,0 +1,190 @@
+"""`PressResult.gradient` against central differences of whole presses, and what it refuses.
+
+The presses of the differences run in double precision with a tight tolerance, so that a step may be far below the distance to the
+next change of the active set. Errors are in the norm over a load step's map, relative to the difference's.
+"""
+
+import pickle
+import warnings
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import trimesh
+from support.sensors import CORO
+
+from softtact.contact.unilateral import ContactSettings, press_elastic
+from softtact.errors import InputError, ShellWarning
+from softtact.models.elastic import compliance as elastic
+from softtact.models.quarter_symmetry import ParityBlocks
+from softtact.press import gradient
+from softtact.press.sensor import Sensor
+from softtact.sensors.fields import CalibrationBlock
+from softtact.sensors.specification import spec_from_dict
+
+SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (9, 9)})
+FORCES = [0.5, 2.0]
+POSE = np.array([0.31, -0.23, 1.1, 4.0, -3.0, 25.0])
+POSE_NAMES = {"x": 0, "y": 1, "rx": 3, "ry": 4, "rz": 5}
+ARRAYS = {"tactile_map": "tactile_map", "deformation_map": "deformation_map_mm", "depth": "indentation_mm"}
+TIGHT = ContactSettings(tolerance_mm=1e-12, max_iterations=200, inner_tolerance=1e-4, inner_iterations=100)
+TOLERANCE = 1e-5
+
+
+def ellipsoid():
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
+    mesh.apply_scale([5.0, 3.0, 4.0])
+    return mesh
+
+
+def sensor_in_double(spec):
+    made = elastic.elastic_compliance(spec)
+    lower = None if made.lower is None else ParityBlocks(made.lower.blocks.astype(float))
+    return Sensor(spec, {}, prepared_models={"elastic": replace(made, blocks=ParityBlocks(made.blocks.blocks.astype(float)),
+                                                                lower=lower)})
+
+
+@pytest.fixture(scope="module")
+def sensor():
+    return sensor_in_double(SMALL)
+
+
+@pytest.fixture
+def tight(monkeypatch):
+    """Settle contacts in double precision."""
+    monkeypatch.setattr(elastic, "press_elastic", partial(press_elastic, settings=TIGHT))
+
+
+def pressed(sensor, pose=POSE, forces=FORCES, mesh=None):
+    with warnings.catch_warnings(action="ignore", category=ShellWarning):
+        return sensor.press(mesh or ellipsoid(), pose=pose, force_n=forces, model="elastic", label="")
+
+
+def difference(press, step):
+    """Central differences of the arrays of a result by a number."""
+    upper, lower = press(step), press(-step)
+    return {of: (getattr(upper, name) - getattr(lower, name)) / (2 * step) for of, name in ARRAYS.items()}
+
+
+def error(found, wanted):
+    """Relative error of each load step in the norm over its map."""
+    found, wanted = (values.reshape(len(FORCES), -1) for values in (found, wanted))
+    return np.linalg.norm(found - wanted, axis=1) / np.linalg.norm(wanted, axis=1)
+
+
+@pytest.mark.parametrize("name", POSE_NAMES)
+def test_a_gradient_by_the_pose_is_the_difference_of_presses_nearby(sensor, tight, name):
+    result, aside = pressed(sensor), np.eye(6)[POSE_NAMES[name]]
+    wanted = difference(lambda by: pressed(sensor, POSE + by * aside), 1e-6 if name in "xy" else 1e-5)
+    for of in ARRAYS:
+        assert (error(result.gradient(of, "pose")[name], wanted[of]) < TOLERANCE).all(), of
+
+
+def test_a_gradient_by_the_force_is_the_difference_of_presses_nearby(sensor, tight):
+    wanted = difference(lambda by: pressed(sensor, forces=np.add(FORCES, by)), 1e-6)
+    for of in ARRAYS:
+        assert (error(pressed(sensor).gradient(of, "force")["force"], wanted[of]) < TOLERANCE).all(), of
+
+
+def test_a_gradient_by_young_is_the_difference_of_stiffer_and_softer_sensors(sensor, tight):
+    young = SMALL.elastic_layer.young_mpa
+
+    def stiffer(by):
+        made = sensor.prepared_models["elastic"]
+        return pressed(replace(sensor, prepared_models={"elastic": replace(made, blocks=ParityBlocks(
+            made.blocks.blocks * young / (young + by)))}))
+
+    wanted = difference(stiffer, 1e-6)
+    for of in ARRAYS:
+        assert (error(pressed(sensor).gradient(of, "young")["young"], wanted[of]) < TOLERANCE).all(), of
+
+
+PLAIN = {"name": "plain", "kind": "layers", "support": "base", "footprint_mm": [7.2, 7.2], "map_shape": [9, 9],
+         "force_range_n": [0, 50], "taxels": {"rows": 2, "columns": 2}, "layers": [{"material": "silicone", "thickness_mm": 2.0}],
+         "elastic_layer": {"young_mpa": 0.8, "poisson": 0.4}}
+
+
+@pytest.fixture
+def uncached(monkeypatch):
+    """Compute the compliances of thinner and thicker sensors without the user's cache."""
+    monkeypatch.setattr(gradient, "cached_compliance", elastic.elastic_compliance)
+
+
+@pytest.mark.parametrize("spec", [SMALL, spec_from_dict(PLAIN)], ids=["cover", "only layer"])
+def test_a_gradient_by_thickness_is_the_difference_of_thicker_and_thinner_sensors(tight, uncached, spec):
+    """Differences of second order: counts of a single layer hardly depend on its thickness, and have the largest relative error."""
+    def thicker(by):
+        return pressed(sensor_in_double(spec.with_upper_layer(spec.upper_layer_mm + by)))
+
+    result, wanted = thicker(0.0), difference(thicker, 0.005 * spec.upper_layer_mm)
+    for of, tolerance in {"deformation_map": 1e-4, "depth": 1e-4, "tactile_map": 3e-3}.items():
+        assert (error(result.gradient(of, "thickness")["thickness"], wanted[of]) < tolerance).all(), of
+
+
+@pytest.mark.parametrize("changes", [{"support": "none"}, {"edge": {"held": "free"}}], ids=["free below", "free sides"])
+def test_a_gradient_follows_a_layer_with_a_free_side(tight, changes):
+    sensor = sensor_in_double(spec_from_dict(PLAIN | changes))
+    result, wanted = pressed(sensor), difference(lambda by: pressed(sensor, POSE + by * np.eye(6)[1]), 3e-6)
+    for of in ARRAYS:
+        assert (error(result.gradient(of, "pose")["y"], wanted[of]) < TOLERANCE).all(), of
+
+
+def test_a_gradient_follows_a_wall_between_the_surfaces_points(sensor, tight):
+    wall = trimesh.creation.box((0.08, 3.0, 2.0))
+    pose = np.array([0.06, 0.2, 1.0, 1.5, 0.0, 0.0])
+    result, wanted = (pressed(sensor, pose, mesh=wall),
+                      difference(lambda by: pressed(sensor, pose + by * np.eye(6)[3], mesh=wall), 1e-5))
+    for of in ARRAYS:
+        assert (error(result.gradient(of, "pose")["rx"], wanted[of]) < TOLERANCE).all(), of
+
+
+def test_a_gradient_follows_a_calibrated_readout(sensor, tight):
+    taxels = SMALL.taxels
+    block = CalibrationBlock(gain=((1.1,) * taxels.columns,) * taxels.rows, zero_counts=((3.0,) * taxels.columns,) * taxels.rows,
+                             counts_per_relative_change=900.0, noise_counts=1.0, source="a test")
+    known = replace(sensor, spec=SMALL.model_copy(update={"calibration": block}))
+    wanted = difference(lambda by: pressed(known, POSE + by * np.eye(6)[0]), 1e-6)
+    assert (error(pressed(known).gradient("tactile_map", "pose")["x"], wanted["tactile_map"]) < TOLERANCE).all()
+
+
+def test_the_active_set_stays_within_the_margin_and_changes_beyond_it(sensor, tight):
+    result = pressed(sensor)
+    margin = result.gradient("depth", "pose").active_set_margin[0, 0]
+
+    def area(by):
+        return [pressed(sensor, POSE + sign * by * np.eye(6)[0]).contact_area_mm2[0] for sign in (-1, 1)]
+
+    assert area(0.98 * margin) == [result.contact_area_mm2[0]] * 2
+    assert area(1.02 * margin) != [result.contact_area_mm2[0]] * 2
+
+
+def test_a_vector_times_the_gradient_is_the_gradient_of_the_product(sensor):
+    found = pressed(sensor).gradient("tactile_map", ["pose", "force"])
+    weights = np.random.default_rng(1).standard_normal(found.values.shape[:-1])
+    assert found.parameters == ("x", "y", "rx", "ry", "rz", "force") and found.units[-1] == "counts/N"
+    np.testing.assert_allclose(found.vjp(weights)[:, 5], (weights * found["force"]).sum(axis=(1, 2)))
+
+
+def test_a_pressed_result_keeps_its_sensor_in_this_process_only(sensor):
+    result = pressed(sensor)
+    assert result.origin.sensor is sensor and pickle.loads(pickle.dumps(result)).origin is None
+
+
+@pytest.mark.parametrize(("of", "by", "sentence"), [
+    ("force", "pose", "there is no quantity with a gradient 'force'"),
+    ("depth", "posse", "there is no parameter with a gradient 'posse'; did you mean 'pose'"),
+    ("depth", ["x", "friction"], "a press with friction depends on its whole path")])
+def test_unknown_names_are_refused(sensor, of, by, sentence):
+    with pytest.raises(InputError, match=sentence):
+        pressed(sensor).gradient(of, by)
+
+
+def test_presses_without_a_settled_contact_of_known_origin_are_refused(sensor):
+    result = pressed(sensor)
+    for other, sentence in ((replace(result, model="hyperelastic"), "The hyperelastic model has no gradients"),
+                            (replace(result, origin=None), "does not know its sensor and object"),
+                            (replace(result, pad_force_n=0 * result.pad_force_n), "touches nothing of the pad"),
+                            (replace(result, shell_force_n=0.1 * result.normal_force_n), "At 0.5 N the object rests on the shell")):
+        with pytest.raises(InputError, match=sentence):
+            other.gradient("depth", "pose")
