@@ -72,7 +72,8 @@ def whole_runs() -> str:
     """Minutes of make's targets."""
     read = record("whole_runs")
     rows = [[f"`{row['run']}`", row["what"], row["minutes"]] for row in read["rows"]]
-    return f"{source('whole_runs')} {read['note'].capitalize()}.\n\n" + table("run, what, minutes", rows)
+    return (f"{source('whole_runs')} {read['note'].capitalize()}. Jobs and time of the default study (`make`) are those of its "
+            "last run, in its [results](../results.md).\n\n" + table("run, what, minutes", rows))
 
 
 def presses() -> str:

@@ -22,6 +22,7 @@ from pathlib import Path
 import pandas as pd
 import yaml
 from PIL import Image
+from results_found import found
 
 from softtact.errors import InputError
 from softtact.evaluation.decisions import ARCHIVE, CONSISTENT, CONTRADICTION, LEAST_OBJECTS, MEASUREMENTS, UNDECIDED
@@ -143,10 +144,10 @@ def claims_in_words(claims: pd.DataFrame, made: dict[str, object]) -> str:
     columns = ["claim", "where", "paper", "ours", "verdict"]
     head = (f"{len(claims)} claims: {counts_in_words(claims.verdict)}. Rule, uncertainty and evidence of each: "
             "[claims.csv](results/claims.csv).")
-    if not any(file.startswith(RULES) for file in changed(made["sources"])):
+    if not rules_changed(made):
         return f"{head}\n\n{markdown(shown[columns])}"
     printed = {row["claim"]: row for row in print_alone()}
-    shown = shown.assign(today=[judged_today(row, printed) for row in shown.itertuples()])
+    shown = shown.assign(today=verdicts_today(shown, made))
     new = pd.DataFrame([row for claim, row in printed.items() if claim not in set(claims.claim)])
     note = (f"**These verdicts are older than the rules.** The run is of commit `{str(made['commit'])[:12]}`, and the rules have "
             "changed since ([which rules](reference/report.md#the-claims)); it was not repeated. The last column is what the rules "
@@ -155,6 +156,19 @@ def claims_in_words(claims: pd.DataFrame, made: dict[str, object]) -> str:
     tables = markdown(shown[[*columns, "today"]].rename(columns={"today": "by the rules of today"}))
     added = (f"\n\nClaims on print that the run did not judge:\n\n{markdown(new[columns])}" if len(new) else "")
     return f"{head}\n\n{note}\n\n{tables}{added}"
+
+
+def rules_changed(made: dict[str, object]) -> bool:
+    """Whether the rules of the claims are others than those of the run."""
+    return any(file.startswith(RULES) for file in changed(made["sources"]))
+
+
+def verdicts_today(claims: pd.DataFrame, made: dict[str, object]) -> pd.Series:
+    """The verdicts of a kept table; by the rules of today where these have changed since."""
+    if not rules_changed(made):
+        return claims.verdict
+    printed = {row["claim"]: row for row in print_alone()}
+    return pd.Series([judged_today(row, printed) for row in claims.itertuples()], index=claims.index)
 
 
 def print_alone() -> list[dict[str, str]]:
@@ -180,7 +194,11 @@ def judged_today(row: object, printed: dict[str, dict[str, str]]) -> str:
 def page(made: dict[str, object]) -> str:
     """The page's text, from the tables and pictures in docs/results/."""
     edited = ", with edited files" if made["edited"] else ""
+    claims = pd.read_csv(FOLDER / Path(CLAIMS).name, keep_default_na=False)
     parts = ["# Results of the default study\n" if made["study"] == "default" else f"# Results of the study {made['study']}\n",
+             "## What was found\n",
+             *(f"* {sentence}" for sentence in found(FOLDER, verdicts_today(claims, made), str(made["run"]))),
+             "\n## What was run\n",
              "`make results` writes this page from a finished run. Do not edit it.\n",
              f"Made on {made['date']} at commit `{str(made['commit'])[:12]}`{edited}, on {made['machine']} with "
              f"{made['processors']} processors; seed {made['seed']}; SHA-256 of the run's [settings](results/config.yaml) "
@@ -192,7 +210,6 @@ def page(made: dict[str, object]) -> str:
     for name, caption in FIGURES.items():
         if (FOLDER / f"{name}.png").is_file():
             parts.append(f"## {caption.partition('.')[0]}\n\n![{caption}](results/{name}.png)\n\n{caption}\n")
-    claims = pd.read_csv(FOLDER / Path(CLAIMS).name, keep_default_na=False)
     parts += ["## Claims of the paper\n", claims_in_words(claims, made) + "\n"]
     for title, (file, columns) in TABLES.items():
         kept = FOLDER / Path(file).name

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,35 @@ def test_the_page_names_its_run_and_shows_its_claims_figures_and_gaps(script, ru
                  "* No robot.", "results/fig7_maps.png"):
         assert said in text, said
     assert Image.open(script.FOLDER / "fig7_maps.png").size == (900, 300)
+
+
+def numbers_of(text):
+    """The numbers of a text: {written: value}."""
+    written = re.findall(r"(?<![\w.])\d+(?:,\d{3})*(?:\.\d+)?", text)
+    return {word: float(word.replace(",", "")) for word in written}
+
+
+def test_the_page_opens_with_ten_sentences_whose_numbers_stand_in_the_tables():
+    page = (ROOT / "docs/results.md").read_text()
+    sentences = page.partition("## What was found\n\n")[2].partition("\n\n")[0].splitlines()
+    assert len(sentences) == 10 and page.index("## What was found") < page.index("![")
+    tables = [path.read_text() for path in (ROOT / "docs/results").glob("*.csv")]
+    known = [value for text in [*tables, (ROOT / "docs/results/run.json").read_text()] for value in numbers_of(text).values()]
+    verdicts = page.partition("In it: ")[2].partition("\n")[0] + page.partition(" claims: ")[2].partition("\n")[0]
+    for sentence in sentences:
+        for written, value in numbers_of(re.sub("95 % interval", "", sentence)).items():
+            assert written in verdicts or written == "61" or any(float(f"{one:.3g}") == value or one == value for one in known), (
+                f"{written} of {sentence!r} stands in no table")
+
+
+def test_the_sentences_follow_the_tables(script, run, tmp_path):
+    script.write(run)
+    assert "errs by" not in script.PAGE.read_text()
+    policies = pd.read_csv(ROOT / "docs/results/policies.csv")
+    policies.loc[policies.policy == "paper", "mean_error_mm"] = 0.456
+    policies.to_csv(script.FOLDER / "policies.csv", index=False)
+    script.write_page()
+    assert "by an object's complexity errs by 0.456 mm in 6.39 s a press" in script.PAGE.read_text()
 
 
 def test_a_run_that_is_not_finished_or_older_than_the_code_gives_no_page(script, run):
