@@ -10,6 +10,7 @@ import pytest
 from softtact.play import tab as tab_module
 from softtact.play.files import Folder
 from softtact.play.long_press import LongPress
+from softtact.play.recorded import Recorded
 from softtact.play.solver import Solver
 from softtact.play.tab import Tab
 from softtact.press.result import read_press
@@ -19,7 +20,7 @@ class Seen:
     """A view that keeps what it is shown."""
 
     def __init__(self):
-        self.shown, self.refused, self.told, self.long = [], [], [], []
+        self.shown, self.refused, self.told, self.long, self.looked = [], [], [], [], 0
 
     def show(self, shown):
         self.shown.append(shown)
@@ -32,6 +33,9 @@ class Seen:
 
     def show_long(self, words, result, elastic):
         self.long.append((words, result, elastic))
+
+    def show_recorded(self):
+        self.looked += 1
 
 
 def wait_for(condition):
@@ -113,6 +117,18 @@ def test_a_recording_is_played_again_and_becomes_a_movie(tab, seen, tmp_path):
     tab.save_movie()
     wait_for(lambda: any("Saved" in one for one in seen.told))
     assert (tmp_path / "out/recording_1.mp4").stat().st_size > 1000
+
+
+def test_a_recording_of_a_real_sensor_plays_and_presses_with_its_force(tab, seen):
+    recorded = Recorded("real.csv", np.array([0.0, 0.05, 0.3]), np.zeros((3, 7, 4)), np.array([5.0, 7.5, 12.5]))
+    tab.take_recorded(recorded)
+    assert tab.state.force_n == 5.0
+    assert tab.play_recorded()
+    wait_for(lambda: not tab.plays_recorded)
+    assert tab.recorded_s == 0.3 and tab.state.force_n == 12.5 and seen.looked > 2
+    tab.look_at(0.1)
+    assert tab.state.force_n == 7.5
+    wait_for(lambda: seen.shown and seen.shown[-1].result.normal_force_n[-1] == 7.5)
 
 
 def test_without_a_recording_replay_says_what_to_do(tab, seen):

@@ -15,6 +15,7 @@ EXAMPLES = """
   softtact play                                    # objects that ship with the package
   softtact play part.stl --unit mm
   softtact play part.stl --unit mm --sensor gelsight_mini --out presses/
+  softtact play part.stl --unit mm --recording real.csv --force-log log.csv     # a real sensor's readings beside the simulated ones
   softtact play --port 8090 --no-open              # prints the address, and opens no browser
 """
 _FIRST = "sphere"       # of the catalogue
@@ -27,6 +28,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("mesh", metavar="MESH", type=Path, nargs="*", help=f"{MESH_FILE}; more can be given in the page")
     add_unit(command)
     command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor of layers (default: coro)")
+    command.add_argument("--recording", type=Path, metavar="FILE", help="recording of a real sensor, which plays beside the press")
+    command.add_argument("--force-log", type=Path, metavar="FILE", help="log of its forces, with which the object is pressed then")
+    command.add_argument("--finger", type=int, default=0, help="of the recording (default: 0)")
     command.add_argument("--out", type=Path, default=Path("play"), metavar="FOLDER",
                          help="folder that the page saves to, and writes nothing outside of (default: play)")
     command.add_argument("--port", type=int, default=8080, help="port, or the next free one (default: 8080)")
@@ -51,8 +55,10 @@ def _play(options):
     for one in given.values():
         Solver().mesh(one)
     objects = given | {name: Object(path, unit) for name, path, unit in _shipped() if name not in given}
+    recorded = _recorded(options)
     first = next(iter(given.values()), objects[_FIRST])
-    server = PlayServer(State(options.sensor, first), objects, _sensors(options.sensor), options.out, port=options.port)
+    server = PlayServer(State(options.sensor, first), objects, _sensors(options.sensor), options.out, port=options.port,
+                        recorded=recorded)
     announce(f"softtact play: {server.url} (for this machine alone); Ctrl-C ends it.")
     if options.open and (browser := find_browser()) is not None:
         browser.open(server.url)
@@ -65,6 +71,18 @@ def _play(options):
         pass
     finally:
         server.stop()
+
+
+def _recorded(options):
+    """The `Recorded` of --recording, or None."""
+    from softtact.play.recorded import Recorded
+
+    if options.recording is None:
+        for name, value in (("--force-log", options.force_log), ("--finger", options.finger)):
+            if value:
+                raise InputError(f"{name} {value}: it belongs to a recording; add --recording FILE, or leave it out.")
+        return None
+    return Recorded.read(options.recording, log=options.force_log, finger=options.finger)
 
 
 def _shipped():

@@ -51,10 +51,10 @@ class Folder:
         return path
 
     def keep_upload(self, name: str, content: bytes) -> Path:
-        """Keep an uploaded mesh under a safe name; the same file is kept once. Raises InputError for one over the limit."""
+        """Keep an uploaded file under a safe name; the same file is kept once. Raises InputError for one over the limit."""
         safe = _UNSAFE.sub("_", PurePosixPath(name.replace("\\", "/")).name).lstrip("._")[-_LONGEST:]
         if not safe or not Path(safe).suffix:
-            raise InputError(f"{name!r}: the name has no ending such as .stl; give a file of a mesh.")
+            raise InputError(f"{name!r}: the name has no ending such as .stl or .csv; give a file of a mesh or a recording.")
         check_limit(safe, "mesh", len(content))
         folder, stem, suffix = self.path / "uploads", Path(safe).stem, Path(safe).suffix
         for number in count(1):

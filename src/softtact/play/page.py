@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from softtact.errors import SofttactError
 from softtact.play import pictures
 from softtact.play.files import Folder
+from softtact.play.recorded import Recorded
 from softtact.play.solver import Shown
 from softtact.play.state import Object, State
-from softtact.play.tab import LONG_MODELS, Tab
+from softtact.play.tab import LEAST_FORCE_N, LONG_MODELS, Tab
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor
 
@@ -33,7 +34,7 @@ class Page:
     """Widgets and scene of one tab."""
 
     def __init__(self, client: viser.ClientHandle, state: State, objects: dict[str, Object], sensors: list[str],
-                 folder: Folder) -> None:
+                 folder: Folder, recorded: Recorded | None = None) -> None:
         self._client, self._gui, self._scene = client, client.gui, client.scene
         self._objects, self._folder = dict(objects), folder
         self._object_shown: Object | None = None
@@ -45,6 +46,8 @@ class Page:
         self._build_panel(state, sensors)
         self._build_scene()
         self._add_keys()
+        if recorded is not None:
+            self._show_recording(recorded)
         self.tab.start()
 
     # --- what the tab shows: `View` ---
@@ -54,7 +57,7 @@ class Page:
         with self._client.atomic():
             self._show_sensor(shown)
             self._show_object(shown)
-            self._board.image = pictures.board(shown.result, shown.clearance_mm)
+            self._show_board(shown)
             self._numbers.content = self._table(shown)
             self._same.content = f"```bash\n{shown.press.command_lines}\n```\n```python\n{shown.press.python}\n```"
 
@@ -85,6 +88,22 @@ class Page:
         self._difference.image = pictures.comparison(result, elastic.result)
         self._difference.visible = True
 
+    def show_recorded(self) -> None:
+        """Show the recording's reading at the present time."""
+        tab = self.tab
+        with self._client.atomic():
+            self._moment.value = round(tab.recorded_s, 2)
+            self._play.label = "Stop" if tab.plays_recorded else "Play"
+            if tab.shown is not None:
+                self._show_board(tab.shown)
+
+    def _show_board(self, shown):
+        recorded, time_s = self.tab.recorded, self.tab.recorded_s
+        counts = None if recorded is None else recorded.at(time_s).counts
+        self._board.image = pictures.board(shown.result, shown.clearance_mm, counts)
+        if recorded is not None:
+            self._recorded_words.content = _plain(recorded.in_words(time_s, pictures.taxels_of(shown.result)))
+
     # --- panel ---
 
     def _build_panel(self, state, sensors):
@@ -95,7 +114,7 @@ class Page:
         self._numbers = gui.add_markdown("The first map follows.")
         with gui.add_folder("Load"):
             self._load_by = gui.add_dropdown("load by", ("force", "depth"), initial_value=state.load_by)
-            self._force = gui.add_slider("force, N", 0.1, 50.0, 0.1, state.force_n, visible=state.load_by == "force")
+            self._force = gui.add_slider("force, N", LEAST_FORCE_N, 50.0, 0.1, state.force_n, visible=state.load_by == "force")
             self._depth = gui.add_slider("depth, mm", 0.01, 2.0, 0.01, state.depth_mm, visible=state.load_by == "depth")
             self._slide_x = gui.add_slider("slide x, mm", -5.0, 5.0, 0.1, 0.0)
             self._slide_y = gui.add_slider("slide y, mm", -5.0, 5.0, 0.1, 0.0)
@@ -123,9 +142,31 @@ class Page:
             movie = gui.add_button("Save recording as MP4", icon=viser.Icon.MOVIE)
             save = gui.add_button("Save press: NetCDF, PNG, lines", icon=viser.Icon.DOWNLOAD)
             self._told = gui.add_markdown(f"Files go to {self._folder.path}.")
+        self._build_recorded()
         with gui.add_folder("The same press"):
             self._same = gui.add_markdown("")
         self._bind(centre, run, replay, movie, save)
+
+    def _build_recorded(self):
+        gui = self._gui
+        with gui.add_folder("Recording of a real sensor", expand_by_default=False):
+            take = gui.add_upload_button("Take a recording", icon=viser.Icon.UPLOAD, mime_type=".csv,.mcap")
+            self._moment = gui.add_slider("time, s", 0.0, 1.0, 0.01, 0.0)
+            self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY)
+            self._recorded_words = gui.add_markdown("None.")
+        take.on_upload(lambda _: self._take_recording(take.value))
+        self._moment.on_update(lambda event: self.tab.look_at(float(self._moment.value)) if event.client is not None else None)
+        self._play.on_click(lambda _: self.tab.play_recorded())
+
+    def _take_recording(self, file):
+        try:
+            self._show_recording(Recorded.read(self._folder.keep_upload(file.name, file.content)))
+        except SofttactError as error:
+            self._recorded_words.content = _plain(str(error))
+
+    def _show_recording(self, recorded):
+        self._moment.max = max(round(recorded.duration_s, 2), 0.01)
+        self.tab.take_recorded(recorded)
 
     def _bind(self, centre, run, replay, movie, save):
         def on(handle: Any, change: Callable[[], Any]) -> None:
@@ -196,7 +237,7 @@ class Page:
     def _loaded(self, state, times):
         if state.load_by == "depth":
             return {"depth_mm": float(np.clip(state.depth_mm * times, _LEAST_DEPTH_MM, self._depth.max))}
-        return {"force_n": round(float(np.clip(state.force_n * times, 0.1, self._force.max)), 2)}
+        return {"force_n": round(float(np.clip(state.force_n * times, LEAST_FORCE_N, self._force.max)), 2)}
 
     def _table(self, shown):
         """The numbers of a press as Markdown."""

@@ -34,12 +34,13 @@ def coloured(values: np.ndarray, low: float, high: float, name: str = "viridis")
     return colours(name)[np.rint(255 * np.clip(np.nan_to_num(share), 0, 1)).astype(int)]
 
 
-def board(result: PressResult, clearance_mm: np.ndarray | None = None) -> np.ndarray:
+def board(result: PressResult, clearance_mm: np.ndarray | None = None, recorded: np.ndarray | None = None) -> np.ndarray:
     """One image (h, w, 3) uint8: the deformation map, beside it the taxels or the camera's image.
 
     clearance_mm: (y, x), negative in the contact, which gets a white outline
+    recorded: counts (rows, columns) of a real sensor, shown beside the simulated ones and in their colours
     """
-    return _beside(_panels(result, clearance_mm), caption=_caption(result))
+    return _beside(_panels(result, clearance_mm, recorded), caption=_caption(result))
 
 
 def comparison(result: PressResult, elastic: PressResult) -> np.ndarray:
@@ -55,12 +56,14 @@ def _caption(result):
             f"{result.contact_area_mm2[-1]:.4g} mm2 ({result.model})")
 
 
-def _panels(result, clearance):
-    shown = result.deformation_map_mm[-1]
+def _panels(result, clearance, recorded=None):
+    shown, taxels = result.deformation_map_mm[-1], taxels_of(result)
     panels = [_panel(_map_image(shown, clearance), f"deformation, up to {np.abs(shown).max():.3f} mm")]
-    if (taxels := taxels_of(result)) is not None:
-        panels.append(_panel(_taxel_image(taxels, result), f"taxels, up to {np.nanmax(taxels):.0f} counts"))
-    elif (image := camera_image(result)) is not None:
+    read = {name: counts for name, counts in (("taxels", taxels), ("recorded", recorded)) if counts is not None}
+    high = max([1.0, *(float(np.nanmax(counts)) for counts in read.values())])
+    panels += [_panel(_taxel_image(counts, result, high), f"{name}, up to {np.nanmax(counts):.0f} counts")
+               for name, counts in read.items()]
+    if taxels is None and (image := camera_image(result)) is not None:
         panels.append(_panel(Image.fromarray(image), "camera image"))
     return panels
 
@@ -134,9 +137,8 @@ def _map_image(shown, clearance):
     return Image.fromarray(pixels)
 
 
-def _taxel_image(counts, result):
-    """Tiles with numbers, in the proportions of the sensor."""
-    high = max(float(np.nanmax(counts)), 1.0)
+def _taxel_image(counts, result, high):
+    """Tiles with numbers, in the proportions of the sensor; high: counts of the brightest colour."""
     counts = counts[::-1]     # the lowest row last, as y goes up
     rgb = coloured(counts, 0.0, high, "inferno")
     width, height = _size((np.ptp(result.y_mm), np.ptp(result.x_mm)))

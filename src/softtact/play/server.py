@@ -13,6 +13,7 @@ from viser import _messages  # those of uploads and of the tunnel, which viser h
 from softtact.inputs import limit
 from softtact.play.files import Folder
 from softtact.play.page import Page
+from softtact.play.recorded import Recorded
 from softtact.play.state import Object, State
 
 HOST = "127.0.0.1"
@@ -21,8 +22,12 @@ HOST = "127.0.0.1"
 class PlayServer:
     """Serves the page until `stop`."""
 
-    def __init__(self, state: State, objects: dict[str, Object], sensors: list[str], folder: Path, *, port: int) -> None:
-        """Serve on a port, or the next free one; 0 takes any. objects: what the page offers, by name; state: of a new tab."""
+    def __init__(self, state: State, objects: dict[str, Object], sensors: list[str], folder: Path, *, port: int,
+                 recorded: Recorded | None = None) -> None:
+        """Serve on a port, or the next free one; 0 takes any.
+
+        objects: what the page offers, by name;  state: of a new tab;  recorded: of a real sensor, beside the press
+        """
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)     # a tab was closed during a press
         self._folder = Folder(folder)
         self._pages: dict[int, Page] = {}
@@ -33,7 +38,7 @@ class PlayServer:
         for kind in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             sockets.unregister_handler(kind)
         sockets.on_client_connect(self._check_origin)
-        self._server.on_client_connect(lambda client: self._open(client, state, objects, sensors))
+        self._server.on_client_connect(lambda client: self._open(client, state, objects, sensors, recorded))
         self._server.on_client_disconnect(self._close)
 
     @property
@@ -66,9 +71,9 @@ class PlayServer:
         if origin not in (None, *(f"http://{host}:{self.port}" for host in (HOST, "localhost"))):
             await live.close(1008, "other site")
 
-    def _open(self, client, state, objects, sensors):
+    def _open(self, client, state, objects, sensors, recorded):
         _limit_uploads(client)
-        page = Page(client, state, objects, sensors, self._folder)
+        page = Page(client, state, objects, sensors, self._folder, recorded)
         with self._lock:
             self._pages[client.client_id] = page
         if client.client_id not in self._server.get_clients():     # closed meanwhile

@@ -17,6 +17,7 @@ from softtact.errors import InputError, SofttactError
 from softtact.play.files import FPS, Folder
 from softtact.play.long_press import LongPress
 from softtact.play.pictures import board
+from softtact.play.recorded import Recorded
 from softtact.play.solver import Shown, Solver
 from softtact.play.state import Press, State
 from softtact.press.result import PressResult
@@ -24,6 +25,7 @@ from softtact.press.result import PressResult
 _RESTS_S = 0.35         # without a change, after which the whole map follows
 _LOOK_S = 0.1           # between two looks at a long press
 _LONGEST_S = 300.0      # of a recording
+LEAST_FORCE_N = 0.1     # of the page
 LONG_MODELS = ("foundation", "hyperelastic", "auto", "solid")
 
 
@@ -41,6 +43,9 @@ class View(Protocol):
 
     def show_long(self, words: str, result: PressResult | None, elastic: Shown | None) -> None:
         """Show the progress or the end of a long press; elastic: the elastic map of the same press."""
+
+    def show_recorded(self) -> None:
+        """Show the reading of a real sensor's recording at the present time."""
 
 
 class Tab:
@@ -62,6 +67,11 @@ class Tab:
         self._refused: State | None = None
         self._recording: list[tuple[float, State]] | None = None
         self._recorded: list[tuple[float, State]] = []
+        self.recorded: Recorded | None = None
+        """Of a real sensor."""
+        self.recorded_s = 0.0
+        """The time in it that is shown."""
+        self._plays = threading.Event()
         self._lock, self._wake, self._closed = threading.RLock(), threading.Event(), threading.Event()
         self._preparing: set[str] = set()
         self._thread = threading.Thread(target=self._work, daemon=True, name="softtact play")
@@ -159,6 +169,47 @@ class Tab:
             if number % int(FPS) == 0:
                 self._view.tell(f"Writing the movie: {number} of {len(moments)} frames.")
             yield frame
+
+    # --- a recording of a real sensor ---
+
+    def take_recorded(self, recorded: Recorded) -> None:
+        """Show a recording beside the press, from its beginning."""
+        self._plays.clear()
+        self.recorded = recorded
+        self.look_at(0.0)
+
+    def look_at(self, time_s: float) -> None:
+        """Show a recording's reading at a time in s; where its force is known, press with it."""
+        if self.recorded is None:
+            return
+        self.recorded_s = float(np.clip(time_s, 0.0, self.recorded.duration_s))
+        self._view.show_recorded()
+        force = self.recorded.at(self.recorded_s).force_n
+        if force is not None and force >= LEAST_FORCE_N:
+            self.change(load_by="force", force_n=round(force, 2))
+
+    def play_recorded(self) -> bool:
+        """Play the recording in real time from the time shown, or stop it; return whether it plays now."""
+        if self._plays.is_set() or self.recorded is None:
+            self._plays.clear()
+            return False
+        if self.recorded_s >= self.recorded.duration_s:
+            self.recorded_s = 0.0
+        self._plays.set()
+        self._aside(lambda: self._play_recorded(self.recorded, time.monotonic() - self.recorded_s))
+        return True
+
+    def _play_recorded(self, recorded, start):
+        while self._plays.is_set() and self.recorded is recorded and not self._closed.wait(1 / FPS):
+            self.look_at(time.monotonic() - start)
+            if self.recorded_s >= recorded.duration_s:
+                self._plays.clear()
+        self._view.show_recorded()
+
+    @property
+    def plays_recorded(self) -> bool:
+        """Whether the recording plays."""
+        return self._plays.is_set()
 
     # --- saving ---
 
