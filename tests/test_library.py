@@ -6,6 +6,7 @@ import subprocess
 import sys
 import sysconfig
 import zipfile
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,7 @@ def test_import_softtact_loads_nothing_heavy_and_a_sensor_none_of_the_extras():
     first, then = (set(line.split()) for line in said.splitlines())
     assert status == 0
     assert not first & {"numpy", "scipy", "numba", "trimesh", "pydantic", "yaml", *EXTRAS}
-    loaded_by_others = {"pyarrow", "cascadio"}     # pandas and trimesh load them where they are
+    loaded_by_others = {"pyarrow", "cascadio", "PIL"}     # pandas and trimesh load them where they are
     assert "numba" in then and not then & (set(BROUGHT_BY_EXTRAS) - loaded_by_others)
 
 
@@ -135,6 +136,7 @@ def test_the_costs_of_the_shipped_studies_are_printed_in_any_folder(tmp_path, mo
     ("torch", ["predict", "map.npy", "--network", "model.pt"], "learn"),
     ("optuna", ["stage", "search_hyperparameters"], "learn"),
     ("jinja2", ["stage", "report"], "workflow"),
+    ("skimage", ["detect-discs", "frame.png", "--pixel-mm", "0.03", "--out", "discs.csv"], "optics"),
     ("skfem", ["skin", str(ROOT / "config/tiny_skin.yaml"), "--out", "results/none"], "skin"),
 ])
 def test_a_command_whose_extra_is_missing_says_which_to_install(package, arguments, extra):
@@ -159,6 +161,16 @@ def test_a_video_needs_the_extra_and_a_picture_does_not(tmp_path):
     io.imsave(tmp_path / "frame.png", np.asarray(frame))
     status, said, _ = without("av", "detect-discs", str(tmp_path / "frame.png"), *arguments)
     assert status == 0 and "discs: 1" in said
+
+
+def test_a_picture_needs_the_extra_and_its_lack_is_told_before_the_press(tmp_path, monkeypatch):
+    from softtact.commands import common, press_gel
+
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    for ask in (lambda path: common.check_pictures(None, path), lambda path: press_gel.check_images(Namespace(image=path), None)):
+        with pytest.raises(InputError, match=r"press\.png: This needs \w+, which is not installed here; .*softtact\[plot\]'"):
+            ask(tmp_path / "press.png")
+    common.check_pictures(None, None)
 
 
 def test_a_gpu_needs_the_extra_and_auto_does_without(tmp_path):
@@ -235,9 +247,8 @@ def test_the_wheel_holds_the_sensors_materials_studies_and_types(wheel):
 def test_the_wheel_presses_the_shipped_sensor_in_an_empty_folder(softtact_in, part, tmp_path):
     assert softtact_in("--version") == (0, f"softtact {softtact.__version__}\n", "")
     status, said, complained = softtact_in("press", "part.stl", "--unit", "mm", "--force", 5, "--sensor", "coro", "--model",
-                                           "elastic", "--out", "press.nc", "--plot", "press.png")
-    assert status == 0, complained
-    assert "elastic model on" in said and (tmp_path / "press.png").stat().st_size > 0
+                                           "elastic", "--out", "press.nc")
+    assert status == 0 and "elastic model on" in said, complained
     assert softtact.read_press(tmp_path / "press.nc").normal_force_n.tolist() == [5.0]
 
 

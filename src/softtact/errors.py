@@ -1,11 +1,14 @@
 """Errors and warnings of softtact, and which extra installs which package. A message names the field, its value and the remedy."""
 
+import importlib.util
+from pathlib import Path
 from typing import Any
 
-EXTRAS = {"snakemake": "workflow", "jinja2": "workflow", "torch": "learn", "optuna": "learn", "pyvista": "view", "vtk": "view",
-          "vtkmodules": "view", "viser": "view", "av": "optics", "pypardiso": "mkl", "openpyxl": "excel", "skfem": "skin",
-          "mujoco": "robot", "gymnasium": "robot", "pytetwild": "mesh", "warp": "device", "cascadio": "cad", "collada": "cad",
-          "rosbags": "ros", "pyarrow": "lerobot"}
+EXTRAS = {"matplotlib": "plot", "PIL": "plot", "skimage": "optics", "tifffile": "optics", "imagecodecs": "optics", "av": "optics",
+          "snakemake": "workflow", "jinja2": "workflow", "torch": "learn", "optuna": "learn", "pyvista": "view", "vtk": "view",
+          "vtkmodules": "view", "viser": "view", "pypardiso": "mkl", "openpyxl": "excel", "skfem": "skin", "mujoco": "robot",
+          "gymnasium": "robot", "pytetwild": "mesh", "warp": "device", "cascadio": "cad", "collada": "cad", "rosbags": "ros",
+          "pyarrow": "lerobot"}
 
 
 class SofttactError(Exception):
@@ -87,3 +90,9 @@ def missing_extra(error: ImportError) -> str | None:
 def how_to_install(package: str) -> str:
     """One sentence that says which extra brings a package of `EXTRAS`."""
     return f"This needs {package}, which is not installed here; run: pip install 'softtact[{EXTRAS[package]}]'."
+
+
+def require(package: str, what: str | Path) -> None:
+    """Raise InputError, before any work, where a package of `EXTRAS` is not installed; `what`: the option or file that needs it."""
+    if importlib.util.find_spec(package) is None:
+        raise InputError(f"{what}: {how_to_install(package)}")

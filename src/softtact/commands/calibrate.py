@@ -4,7 +4,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from softtact.commands.common import add_command, add_unit, check_names, report_reading, sensor_path, sensor_spec, show
+from softtact.commands.common import (
+    add_command,
+    add_unit,
+    check_names,
+    check_pictures,
+    report_reading,
+    sensor_path,
+    sensor_spec,
+    show,
+)
 from softtact.errors import InputError
 from softtact.inputs import refuse_twice
 from softtact.outputs import check_outputs, refuse_overwriting
@@ -88,6 +97,7 @@ def _checked(options):
 
     check_outputs(options.out, options.report)
     check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})
+    check_pictures(options.report)
     refuse_twice(options.recordings)
     count = len(options.recordings)
     meshes, forces, places = (_for_each(name, getattr(options, name), count) for name in ("press", "force", "place"))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softtact.errors import InputError
+from softtact.errors import InputError, require
 from softtact.exits import EXIT_STATUS
 
 if TYPE_CHECKING:
@@ -127,6 +127,12 @@ def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:
     for path, known in endings.items():
         if path and path.suffix.lower() not in known:
             raise InputError(f"{path}: the file is written as {' or '.join(known)}; give a name with such an ending.")
+
+
+def check_pictures(*paths: Path | None) -> None:
+    """Refuse a page or a picture, before any work, where the package that draws it is not installed."""
+    for path in filter(None, paths):
+        require("matplotlib", path)
 
 
 def pairs(option: str, texts: Iterable[str] | None) -> Iterator[tuple[str, str]]:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from softtact.commands.common import add_command, numbers, pairs, show
+from softtact.commands.common import add_command, check_pictures, numbers, pairs, show
 from softtact.errors import InputError
 from softtact.outputs import check_outputs, refuse_overwriting
 
@@ -75,6 +75,7 @@ def _fit(options):
     config = _material(options)
     shape, timed = _parted(options)
     refuse_overwriting(_inputs(options, config, shape, timed), {"--out": options.out, "--plot": options.plot})
+    check_pictures(options.plot)
     prony = _prony_fit(options, timed)
     card, curves, tests = _elastic(options, config, shape, prony)
     reported = [*(misfit_warnings(card) if curves else ()), *(remark for curve in curves for remark in curve.remarks)]

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softtact.commands.common import add_command, show
+from softtact.commands.common import add_command, check_pictures, show
 from softtact.errors import InputError
 from softtact.outputs import check_outputs, refuse_overwriting
 
@@ -38,6 +38,7 @@ def _predict(options):
 
     check_outputs(options.out, options.plot)
     refuse_overwriting([options.maps, options.network], {"--out": options.out, "--plot": options.plot})
+    check_pictures(options.plot)
     if options.out and options.out.suffix not in WRITTEN:
         raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give a name with such an ending.")
     from softtact.learning.network import load_network, predict

@@ -14,6 +14,7 @@ from softtact.commands.common import (
     any_sensor_spec,
     check_forces,
     check_names,
+    check_pictures,
     origin,
     pairs,
     pose_of,
@@ -117,6 +118,7 @@ def _press(options):
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot, "--image": options.image,
                         "--movie": options.movie})
     check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
+    check_pictures(options.plot)
     if not several:
         check_names({options.out: (".nc",)})
     press = partial(_press_one, options=options, spec=spec, pose=pose, how=how, sensors=[])

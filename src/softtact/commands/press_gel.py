@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softtact.commands.common import check_names
-from softtact.errors import InputError
+from softtact.errors import InputError, require
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,6 +28,8 @@ def add_images(command: argparse.ArgumentParser) -> None:
 def check_images(options: argparse.Namespace, spec: Any) -> None:
     """Refuse an image or a movie of a sensor without a camera, or of another kind of file."""
     check_names({options.image: (".png",)})
+    if options.image:
+        require("PIL", options.image)
     if options.movie:
         from softtact.imaging.movies import check_movie
 

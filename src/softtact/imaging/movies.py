@@ -1,13 +1,12 @@
 """Movies of images: MP4 (extra `optics`) or GIF by the ending of the file's name."""
 
-import importlib.util
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from softtact.errors import InputError, how_to_install
+from softtact.errors import InputError, require
 from softtact.files import atomic_path
 
 MOVIES = (".mp4", ".gif")
@@ -19,8 +18,7 @@ def check_movie(path: str | Path) -> None:
     ending = Path(path).suffix.lower()
     if ending not in MOVIES:
         raise InputError(f"{path}: the file is written as {' or '.join(MOVIES)}; give a name with such an ending.")
-    if ending == ".mp4" and importlib.util.find_spec("av") is None:
-        raise InputError(f"{path}: {how_to_install('av')}")
+    require("av" if ending == ".mp4" else "PIL", path)
 
 
 def write_movie(path: str | Path, frames: Iterable[np.ndarray], *, fps: float, options: Mapping[str, str] | None = None) -> None:

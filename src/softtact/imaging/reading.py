@@ -5,7 +5,6 @@ RGB (TIFF 6.0, Adobe 1992). A TIFF's frames are its pages, or the planes that Im
 reduced copies (thumbnails, pyramids) are skipped.
 """
 
-import importlib.util
 import logging
 import math
 import warnings
@@ -20,7 +19,7 @@ import numpy as np
 import tifffile
 from PIL import ExifTags, Image, ImageOps
 
-from softtact.errors import FrameWarning, InputError, how_to_install
+from softtact.errors import FrameWarning, InputError, require
 from softtact.inputs import VARIABLE, check_input, limit
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp")
@@ -312,8 +311,7 @@ def _negative(values, key):
 
 def video_frames(file: Path) -> Iterator[tuple[int, Callable[[], np.ndarray]]]:
     """Pairs (number, function that gives the frame): (rows, columns) of a deep grey video, (rows, columns, 3) of others."""
-    if importlib.util.find_spec("av") is None:
-        raise InputError(f"{file}: {how_to_install('av')}")
+    require("av", file)
     import av
 
     try:
