@@ -16,7 +16,7 @@ _OBJECT_SMOOTHING_MM = 1e-3
 _CORE_IN_ONE_RING = 0.6     # docs/notebook/2026-11-24-choice-of-the-meshes.md
 SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
 _LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
-_SOLVER_KEYS = ("largest_penetration_mm",)
+_SOLVER_KEYS = ("largest_penetration_mm", "relative_tolerance")
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ class _Jobs:
 
     def hyperelastic(self, name: str, model: Pressing, items: Sequence[DecideItem], forces: Sequence[float]) -> list[Job]:
         """One press a job."""
-        unit = "friction" if model.friction else "fine" if name in self.values.truths else "default"
+        unit = "friction" if model.friction else "truth" if name in self.values.truths else "default"
         unit = "draft" if model.mesh.get("preset") == "draft" and not model.friction else unit
         made, common = f"{self.folder}/presses/{{model}}/{{item}}.nc", {"name": name, "model": model.model_dump(mode="json")}
         return [Job("press", {"object": self.mesh(item), **self.pressing}, {"press": made},

@@ -185,6 +185,8 @@ class Mesh(Section):
                           "half the work, an error of 2 to 2.5 % of the map; no effect on a refined 2-D mesh")
     largest_penetration_mm: PositiveFloat | None = Field(
         None, description="larger penetrations are reduced by augmented Lagrange iterations")
+    relative_tolerance: Annotated[float, Field(gt=0, le=0.01)] | None = Field(
+        None, description="largest unbalanced nodal force as a share of the force; 0.001 changes the map by 0.1 % (rms)")
     height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
     tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
     thickness_scatter: Annotated[float, Field(ge=0, le=0.1)] | None = Field(
