@@ -63,6 +63,13 @@ def test_a_small_network_learns_the_grip_s_force_from_the_taxels(tmp_path):
     assert errors["network"] < 0.5 * errors["mean force"] and (tmp_path / "force.png").stat().st_size > 0
 
 
+def test_sensors_on_a_gripper_of_one_s_own_read_the_force_of_its_motors(tmp_path):
+    pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+    readings = run("attach_to_a_gripper", "--force", 8, "--out", tmp_path / "gripper.png")
+    assert [-reading.force_n[2] for reading in readings] == pytest.approx([8.0, 8.0], rel=0.01)
+    assert (tmp_path / "gripper.png").stat().st_size > 0
+
+
 def loaded():
     import softtact
     from softtact.geometry.meshes import read_mesh

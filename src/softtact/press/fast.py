@@ -2,7 +2,7 @@
 
 import time
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -43,9 +43,14 @@ def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control
     return press_underside(sensor, HeightField.of(placed), forces)
 
 
-def press_underside(sensor: "Sensor", surface: HeightField, forces: np.ndarray) -> PressResult:
-    """The elastic model's press through forces (l,) in N of an object by its underside, which presses of one object can share."""
+def press_underside(sensor: "Sensor", surface: HeightField, forces: np.ndarray, *, model: str = "elastic") -> PressResult:
+    """The press through forces (l,) in N of an object by its underside, which presses of one object can share.
+
+    model: elastic or foundation
+    """
     start = time.perf_counter()
+    if model == "foundation":
+        return _on_foundation(sensor, _near_touch(sensor, surface), forces, RunControl(label=""), start)
     touch = first_touch_mm(sensor, surface)
     press = _elastic(sensor, surface, forces, touch)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
@@ -57,12 +62,42 @@ def force_at_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, g
 
     surface: the underside of the object;  guess_n: a force nearby
     """
+    return _at_depth(sensor, surface, depth_mm, guess_n)[0]
+
+
+@dataclass(frozen=True)
+class DepthPress:
+    """The elastic model's press of an object at a depth, by forces at points."""
+
+    result: PressResult
+    """Of one load step, at the force that the depth needs, or at the sensor's largest if none suffices."""
+    points_mm: np.ndarray
+    """(c, 2) in mm: the points under pressure."""
+    forces_n: np.ndarray
+    """(c,) in N: of the object on them, downwards."""
+    areas_mm2: np.ndarray
+    """(c,) in mm2 of the points."""
+
+
+def press_to_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, guess_n: float) -> DepthPress:
+    """The `DepthPress` of an object by its underside, `depth_mm` below first touch; guess_n: a force nearby, in N."""
+    start, compliance = time.perf_counter(), sensor.prepared("elastic")
+    force, points, press = _at_depth(sensor, surface, depth_mm, guess_n)
+    found = np.array([press.contact.force.sum() if press.contact.force.any() else force])
+    result = elastic_result(sensor, press, found, np.array([time.perf_counter() - start]), touch_mm=first_touch_mm(sensor, surface))
+    pressed = press.contact.force[:, 0] > 0
+    return DepthPress(result, compliance.grid.points[points.nodes[pressed]][:, :2], press.contact.force[pressed, 0],
+                      press.areas[pressed])
+
+
+def _at_depth(sensor, surface, depth_mm, guess_n):
+    """The force at a depth, and the points and the `LayerPress` of the force that was tried last."""
     touch = first_touch_mm(sensor, surface)
     low, high = np.log(_LEAST_FORCE * sensor.spec.force_range_n[1]), np.log(sensor.spec.force_range_n[1])
     wanted, force, power, before = np.log(depth_mm), float(np.clip(np.log(guess_n), low, high)), _POWER, None
     for _ in range(_SECANTS):
-        depth = _elastic(sensor, surface, np.exp([force]), touch).contact.depth[-1] - touch
-        reached = np.log(max(depth, np.finfo(float).tiny))
+        points, press = _elastic_contact(sensor, surface, np.exp([force]), touch)
+        reached = np.log(max(press.contact.depth[-1] - touch, np.finfo(float).tiny))
         if abs(reached - wanted) <= _DEPTH_TOLERANCE:
             break
         low, high = (force, high) if reached < wanted else (low, force)
@@ -75,7 +110,7 @@ def force_at_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, g
             force = 0.5 * (low + high)
         if high - low <= _DEPTH_TOLERANCE:
             break
-    return float(np.exp(force))
+    return float(np.exp(force)), points, press
 
 
 def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, *, model: str) -> np.ndarray:
@@ -87,8 +122,7 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
     if sensor.spec.edge.far:
         raise InputError(f"{sensor.spec.name} is a gel with far sides, of which no maps over force are kept; press it by motions.")
     if model == "foundation":
-        near = _near_touch(sensor, surface)
-        return _on_foundation(sensor, near, forces_n, RunControl(label=""), time.perf_counter()).deformation_map_mm
+        return press_underside(sensor, surface, forces_n, model=model).deformation_map_mm
     press = _elastic(sensor, surface, forces_n, first_touch_mm(sensor, surface), patches=True)
     warn_of_shell(sensor.spec, forces_n, _snapped(forces_n, press.contact.force.sum(axis=0)))
     return felt_displacement(sensor.spec, press.thinning)
@@ -96,6 +130,11 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
 
 def _elastic(sensor, surface, forces, touch, *, patches=False):
     """The `LayerPress` of an object by its underside; touch: descent to first touch."""
+    return _elastic_contact(sensor, surface, forces, touch, patches=patches)[1]
+
+
+def _elastic_contact(sensor, surface, forces, touch, *, patches=False):
+    """The `ObjectPoints` and the `LayerPress` of an object by its underside."""
     compliance = sensor.prepared("elastic")
     underside, stop = Underside(surface, compliance.grid), shell_stop_mm(sensor, surface)
 
@@ -108,7 +147,7 @@ def _elastic(sensor, surface, forces, touch, *, patches=False):
                 else rest_on_shell(compliance, points, len(forces), stop))
 
     return _of_candidates(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
-                         lambda press: press.contact.depth[-1])[1]
+                         lambda press: press.contact.depth[-1])
 
 
 def _above_shell(press, stop_mm):

@@ -24,6 +24,7 @@ from softtact.imaging.depth_image import MovedObject
 from softtact.models.elastic.wide_sliding import WideObject, WideStep
 from softtact.press.gel import gel_result
 from softtact.press.kinds import layers_at_rest
+from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor
 from softtact.readout.registry import readings_of
 from softtact.robot.events import FINGERS, pose_of, set_down
@@ -49,7 +50,7 @@ class _Touch:
                                 about_mm=(float(self.about[0]), float(self.about[1])))
         self._start, self._at, self._force, self._stiffness = np.array(pose), np.zeros(3), np.zeros(3), 0.0
         self.step: WideStep | None = None
-        self.reading: tuple[Mapping[str, np.ndarray], str] = ({}, "")     # of that step
+        self.result: PressResult | None = None     # of that step
 
     def follow(self, pose: np.ndarray, force: np.ndarray) -> WideStep:
         """The gel's state where the object is in a pose (7,) and presses with a force (3,) in N; the last one where it is still."""
@@ -96,10 +97,15 @@ class _Touch:
         return self.mover.follow(MotionStep(ways=ways), load)
 
     def _stiffest(self, step):
-        """Stiffness aside in N/mm of a contact that sticks: of a half-space (Mindlin) and of a thin layer, one beside the other."""
+        """`stiffness_aside` of the contact at a step."""
         layer = self.mover.layer
         area = max(int((step.normal > 0).sum()), 1) * float(np.prod(layer.step_mm))
-        return layer.shear_mpa * (8 * np.sqrt(area / np.pi) / (2 - layer.poisson) + area / layer.thickness_mm)
+        return stiffness_aside(area, layer.thickness_mm, shear_mpa=layer.shear_mpa, poisson=layer.poisson)
+
+
+def stiffness_aside(area_mm2: float, thickness_mm: float, *, shear_mpa: float, poisson: float) -> float:
+    """Stiffness in N/mm of a contact that sticks: of a half-space (Mindlin) and of a thin layer, one beside the other."""
+    return float(shear_mpa * (8 * np.sqrt(area_mm2 / np.pi) / (2 - poisson) + area_mm2 / thickness_mm))
 
 
 def has_gel(sensor: Sensor) -> bool:
@@ -144,7 +150,7 @@ class GelReadings:
 
     def observe(self, poses: np.ndarray, forces: np.ndarray) -> dict[str, np.ndarray]:
         """{readout: (finger, ...)} under an object at poses (finger, 7) in each sensor's frame with forces (finger, 3) in N."""
-        seen = [self._of_finger(finger, poses[finger], forces[finger]) for finger in range(len(FINGERS))]
+        seen = [self.one(finger, poses[finger], forces[finger]) for finger in range(len(FINGERS))]
         self._told = [why for _, why in seen]
         return {name: np.stack([readings[name] for readings, _ in seen]) for name in self._at_rest}
 
@@ -152,7 +158,12 @@ class GelReadings:
         """What an environment tells beside the readings: why a finger's are not valid; empty where they are."""
         return {"validity_reason": list(self._told)}
 
-    def _of_finger(self, finger: int, pose: np.ndarray, force: np.ndarray) -> tuple[Mapping[str, np.ndarray], str]:
+    def result(self, finger: int) -> PressResult | None:
+        """The press of a gel at its last reading; None where it is free."""
+        return self._touches[finger].result if finger in self._touches else None
+
+    def one(self, finger: int, pose: np.ndarray, force: np.ndarray) -> tuple[Mapping[str, np.ndarray], str]:
+        """(readings by their names, why they are not valid) of one gel under an object at a pose (7,) with a force (3,) in N."""
         if -force[2] < _TOUCH_N:
             self._touches.pop(finger, None)
             return self._at_rest, ""
@@ -166,7 +177,7 @@ class GelReadings:
             self._touches.pop(finger, None)
             return self._at_rest, f"free, for {error}"
         if step is not before:
-            result = gel_result(self.sensor, [step], [0.0], touch.object_at(step))
-            readings = {name: np.asarray(values)[0] for name, values in result.readings.items()}
-            touch.reading = readings, str(result.validity_reason[0])
-        return touch.reading
+            touch.result = gel_result(self.sensor, [step], [0.0], touch.object_at(step))
+        result = touch.result
+        assert result is not None     # made with the first step
+        return {name: np.asarray(values)[0] for name, values in result.readings.items()}, str(result.validity_reason[0])

@@ -7,11 +7,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from softtact.errors import ConvergenceError
 from softtact.robot.arm import HOME_RAD, JOINTS, inverse_kinematics
 from softtact.robot.events import FINGERS, PHASES, GraspRecord
+from softtact.robot.geoms import contact_force, contacts_of, pose_of_frame
 from softtact.robot.scene import DOWN, MM, Scene, quaternion, start
 
 _APPROACH_S, _DESCENT_S, _SETTLE_S = 1.0, 0.5, 0.3
@@ -162,7 +162,7 @@ def _is_steady(recent, force_n, share):
 
 def row_of(scene: Scene, data: Any) -> dict[str, Any]:
     """The row of a `GraspRecord` for one state, without the phase."""
-    sensors = [_pose(data.site(f"sensor_{finger}").xpos, data.site(f"sensor_{finger}").xmat) for finger in FINGERS]
+    sensors = [pose_of_frame(data.site(f"sensor_{finger}").xpos, data.site(f"sensor_{finger}").xmat) for finger in FINGERS]
     return {"time_s": data.time, "joint_rad": [data.joint(name).qpos[0] for name in JOINTS],
             "opening_mm": scene.opening_mm(data), "sensor_pose_world": [_seven(*sensor) for sensor in sensors],
             "object_pose_sensor": object_poses(data), "force_n": pad_forces(scene.model, data),
@@ -172,44 +172,33 @@ def row_of(scene: Scene, data: Any) -> dict[str, Any]:
 def object_poses(data: Any) -> np.ndarray:
     """(finger, 7): the object's mesh in each sensor's frame, in mm with the quaternion w, x, y, z."""
     body = data.body("object")
-    at, turn = _pose(body.xpos, body.xmat)
+    at, turn = pose_of_frame(body.xpos, body.xmat)
     poses = []
     for finger in FINGERS:
-        origin, rotation = _pose(data.site(f"sensor_{finger}").xpos, data.site(f"sensor_{finger}").xmat)
+        origin, rotation = pose_of_frame(data.site(f"sensor_{finger}").xpos, data.site(f"sensor_{finger}").xmat)
         poses.append(_seven(rotation.inv().apply(at - origin), rotation.inv() * turn))
     return np.array(poses)
 
 
 def pad_forces(model: Any, data: Any) -> np.ndarray:
     """(finger, 3) in N: the object's force on each sensor, in the sensor's frame."""
-    forces, wrench = np.zeros((2, 3)), np.zeros(6)
-    for number, finger, sign in _contacts_of(model, data):
-        mujoco.mj_contactForce(model, data, number, wrench)
-        world = sign * data.contact[number].frame.reshape(3, 3).T @ wrench[:3]
+    forces, pads = np.zeros((2, 3)), _pads(model)
+    for number, pad, _, sign in contacts_of(data, pads):
+        finger = pads.index(pad)
+        world = contact_force(model, data, number, sign)
         forces[finger] += data.site(f"sensor_{FINGERS[finger]}").xmat.reshape(3, 3).T @ world
     return forces
 
 
 def contacts(model: Any, data: Any) -> np.ndarray:
     """(finger,) of bool: whether the object touches each pad."""
-    touching = np.zeros(2, dtype=bool)
-    for _, finger, _ in _contacts_of(model, data):
-        touching[finger] = True
-    return touching
+    pads = _pads(model)
+    touched = {pad for _, pad, _, _ in contacts_of(data, pads)}
+    return np.array([pad in touched for pad in pads])
 
 
-def _contacts_of(model, data):
-    """(number, finger, sign) of each contact of a pad and the object; MuJoCo's force acts on the second body of a pair."""
-    pads = [model.geom(f"pad_{finger}").id for finger in FINGERS]
-    for number in range(data.ncon):
-        pair = data.contact[number].geom
-        for finger, pad in enumerate(pads):
-            if pad in pair and data.contact[number].dist <= 0:
-                yield number, finger, 1.0 if pair[1] == pad else -1.0
-
-
-def _pose(position_m, matrix):
-    return np.array(position_m) / MM, Rotation.from_matrix(np.reshape(matrix, (3, 3)))
+def _pads(model):
+    return [model.geom(f"pad_{finger}").id for finger in FINGERS]
 
 
 def _seven(position_mm, rotation):

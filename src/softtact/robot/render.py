@@ -42,10 +42,23 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
 
     view: azimuth and elevation in degrees, distance in m, towards the hand or, beyond 1 m, the middle of the arm
     """
-    states = np.array([state_of(scene, record, row) for row in rows])
+    return _drawn(scene.model, [state_of(scene, record, row) for row in rows], [_camera(record, row, view) for row in rows], size,
+                  timeout_s)
+
+
+def draw_states(model: Any, states: Sequence[np.ndarray], *, camera: tuple[float, float, float, float, float, float],
+                size: tuple[int, int] = (480, 640), timeout_s: float = 120.0) -> np.ndarray | None:
+    """Images (state, height, width, 3) of any mujoco.MjModel in states of its qpos, or None, with a sentence on stderr.
+
+    camera: azimuth and elevation in degrees, distance in m, and the point in m at which it looks
+    """
+    return _drawn(model, states, [camera] * len(states), size, timeout_s)
+
+
+def _drawn(model, states, cameras, size, timeout_s):
     with temporary_folder() as folder:
-        mujoco.mj_saveModel(scene.model, str(folder / "scene.mjb"), None)
-        np.savez(folder / "states.npz", qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
+        mujoco.mj_saveModel(model, str(folder / "scene.mjb"), None)
+        np.savez(folder / "states.npz", qpos=np.array(states), size=size, camera=cameras)
         images = drawn_apart(_COMMAND, folder, sentence=_NO_PICTURE, timeout_s=timeout_s, environment=_environment())
     return None if images is None else images["images"]
 

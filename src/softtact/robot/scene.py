@@ -35,11 +35,12 @@ SENSOR_IN_TOOL = {"left": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.
 _PAD_TIME_S, _FIXTURE_TIME_S = 0.004, 0.004     # time constants of MuJoCo's contacts and welds, at least two time steps
 # Of contacts: stiffness grows with the lighter body's mass, and 0.3 g must still bear 50 N between the pads.
 _STIFF = (0.99, 0.9999, 0.0001, 0.5, 2.0)
+PAD_CONTACT: dict[str, Any] = {"condim": 4, "solref": (_PAD_TIME_S, 1), "solimp": _STIFF}
 _RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)      # moves by nanometres under an object's weight
 _TURNING = 10.0                 # weight of rotations in a weld: 20 N at 5 mm from the middle tilt an object by 0.03 mrad
-_TORSION_M = 0.005            # radius of the patch that resists torsion: pads are soft, hulls touch in points
+TORSION_M = 0.005            # radius of the patch that resists torsion: pads are soft, hulls touch in points
 _FINGER_N_PER_M, _FINGER_NS_PER_M, _FINGER_KG = 2e4, 120.0, 0.1
-_DARK, _PAD, _OBJECT, _FLOOR = (0.2, 0.2, 0.22, 1.0), (0.1, 0.55, 0.45, 1.0), (0.88, 0.5, 0.2, 1.0), (0.93, 0.93, 0.94, 1.0)
+_DARK, PAD_COLOUR, _OBJECT, _FLOOR = (0.2, 0.2, 0.22, 1.0), (0.1, 0.55, 0.45, 1.0), (0.88, 0.5, 0.2, 1.0), (0.93, 0.93, 0.94, 1.0)
 _GREY, _FLOOR_M = (0.6, 0.6, 0.62, 1.0), -0.4
 _NEEDED = {"joint": (*JOINTS, "finger_left", "finger_right"), "actuator": (*JOINTS, "finger_left", "finger_right"),
            "site": ("grip", "sensor_left", "sensor_right"), "geom": ("pad_left", "pad_right")}
@@ -178,7 +179,7 @@ def _add_finger(robot, hand, finger, side, reach, half_stroke, spec):
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=(side * (2 * thick + 0.006), 0, -0.012), size=(0.006, 0.6 * x, y + 0.012),
                   mass=_FINGER_KG, rgba=_DARK, contype=0, conaffinity=0)
     body.add_geom(name=f"pad_{finger}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=(side * thick, 0, 0), size=(thick, x, y), mass=0.0,
-                  rgba=_PAD, contype=1, conaffinity=2)
+                  rgba=PAD_COLOUR, contype=1, conaffinity=2)
     rotation = Rotation.from_matrix(SENSOR_IN_TOOL[finger])
     body.add_site(name=f"sensor_{finger}", quat=quaternion(rotation), size=(0.001, 0, 0))
     motor = robot.add_actuator(name=f"finger_{finger}", target=f"finger_{finger}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
@@ -204,8 +205,7 @@ def _add_object(robot, mesh, settings, placement, mass):
     body = robot.worldbody.add_body(name="object", pos=origin, quat=quaternion(Rotation.from_matrix(turn)))
     body.add_freejoint(name="object")
     body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object", mass=mass, rgba=_OBJECT, contype=2,
-                  conaffinity=1, condim=4, friction=(settings.friction, settings.friction * _TORSION_M, 0.0), priority=1,
-                  solref=(_PAD_TIME_S, 1), solimp=_STIFF)
+                  conaffinity=1, friction=(settings.friction, settings.friction * TORSION_M, 0.0), priority=1, **PAD_CONTACT)
     robot.add_equality(name="fixture", type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1="carriage",
                        name2="object", solref=(_FIXTURE_TIME_S, 1), solimp=_RIGID,
                        data=[*[0] * 10, _TURNING, 0])     # about the object's origin, in the pose that it begins with

@@ -1,0 +1,106 @@
+"""Bodies of any MuJoCo model as meshes that a sensor can press, and the engine's contact forces between geoms.
+
+Lengths of MuJoCo are taken to be in m; meshes are in mm, in the body's frame.
+"""
+
+from collections.abc import Callable, Collection, Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from softtact.errors import InputError
+
+MM = 1e-3
+# A ball of 10 mm of so many facets lies within 2 um of a sphere; so does a round side of so many sections.
+_SUBDIVISIONS, _SECTIONS = 5, 160
+_TYPES = mujoco.mjtGeom
+
+
+def _round_end(size):
+    return trimesh.creation.capsule(radius=size[0], height=2 * size[1], count=[_SECTIONS, _SECTIONS // 2])
+
+
+def _ball(size):
+    ball = trimesh.creation.icosphere(subdivisions=_SUBDIVISIONS)
+    return ball.apply_scale(size)
+
+
+_SHAPES: dict[Any, Callable[[np.ndarray], trimesh.Trimesh]] = {
+    _TYPES.mjGEOM_BOX: lambda size: trimesh.creation.box(2 * size),
+    _TYPES.mjGEOM_SPHERE: lambda size: _ball(size[:1].repeat(3)),
+    _TYPES.mjGEOM_ELLIPSOID: _ball,
+    _TYPES.mjGEOM_CAPSULE: _round_end,
+    _TYPES.mjGEOM_CYLINDER: lambda size: trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=_SECTIONS)}
+
+
+def name_of(model: Any, body: int) -> str:
+    """The name of a body, or its number where it has none."""
+    return model.body(body).name or f"body {body}"
+
+
+def geoms_of(model: Any, body: int) -> np.ndarray:
+    """Numbers of a body's geoms: of those that collide, or of all where none does."""
+    first, count = model.body_geomadr[body], model.body_geomnum[body]
+    geoms = np.arange(first, first + count)
+    collide = (model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)
+    return geoms[collide] if collide.any() else geoms
+
+
+def body_mesh(model: Any, body: int) -> trimesh.Trimesh:
+    """The geoms of a body (`geoms_of`) in one mesh in mm, in the body's frame.
+
+    They may overlap: a sensor touches their lower envelope. Meshes are the true ones, not their convex hulls.
+    Raises InputError for a body without geoms, and for a plane or a height field, which have no sides.
+    """
+    parts = [_geom_mesh(model, body, geom) for geom in geoms_of(model, body)]
+    if not parts:
+        raise InputError(f"The body {name_of(model, body)!r} has no geom that a sensor can press; give it one, or leave it out of "
+                         "'objects'.")
+    whole: trimesh.Trimesh = trimesh.util.concatenate(parts)
+    return whole
+
+
+def _geom_mesh(model, body, geom):
+    kind = _TYPES(model.geom_type[geom])
+    if kind in (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF):
+        mesh = model.mesh(model.geom_dataid[geom])
+        vertices = model.mesh_vert[mesh.vertadr[0]:mesh.vertadr[0] + mesh.vertnum[0]]
+        faces = model.mesh_face[mesh.faceadr[0]:mesh.faceadr[0] + mesh.facenum[0]]
+        shape = trimesh.Trimesh(vertices / MM, faces, process=False)
+    elif kind in _SHAPES:
+        shape = _SHAPES[kind](model.geom_size[geom] / MM)
+    else:
+        what = kind.name.removeprefix("mjGEOM_").lower()
+        raise InputError(f"The body {name_of(model, body)!r} has a geom of type {what!r}, which a sensor cannot press; use a box, "
+                         "a sphere, an ellipsoid, a capsule, a cylinder or a mesh.")
+    turn = Rotation.from_quat(model.geom_quat[geom], scalar_first=True)
+    shape.vertices = turn.apply(shape.vertices) + model.geom_pos[geom] / MM
+    return shape
+
+
+def contacts_of(data: Any, geoms: Collection[int]) -> Iterator[tuple[int, int, int, float]]:
+    """(number of the contact, geom of `geoms`, other geom, sign) of each contact of geoms that touch.
+
+    sign: of MuJoCo's force on the geom of `geoms`, as it acts on the second of a pair
+    """
+    for number in range(data.ncon):
+        contact = data.contact[number]
+        first, second = (int(geom) for geom in contact.geom)
+        if contact.dist > 0 or (first in geoms) == (second in geoms):
+            continue
+        yield (number, second, first, 1.0) if second in geoms else (number, first, second, -1.0)
+
+
+def contact_force(model: Any, data: Any, number: int, sign: float) -> np.ndarray:
+    """The force (3,) in N of a contact in the world's frame, times a sign."""
+    wrench = np.zeros(6)
+    mujoco.mj_contactForce(model, data, number, wrench)
+    return sign * data.contact[number].frame.reshape(3, 3).T @ wrench[:3]
+
+
+def pose_of_frame(position_m: np.ndarray, matrix: np.ndarray) -> tuple[np.ndarray, Rotation]:
+    """(position (3,) in mm, rotation) of a frame of MuJoCo, by its place in m and its matrix of nine numbers."""
+    return np.array(position_m) / MM, Rotation.from_matrix(np.reshape(matrix, (3, 3)))

@@ -1,0 +1,237 @@
+"""Sensors on bodies of anyone's MuJoCo scene: a known weight is read, from the engine's forces and from its poses."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from support.gels import SMALL_GEL
+
+import softtact
+from softtact.errors import InputError
+from softtact.geometry.pose import Pose
+
+mujoco = pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+from softtact.robot import attach, hand_back  # noqa: E402
+from softtact.robot.geoms import body_mesh  # noqa: E402
+
+G = 9.81
+# The sensing surface is at z = 0: the plate ends 2.5 mm below, where the board of the sensor lies.
+SCENE = """<mujoco><option timestep="{dt}"/><worldbody>
+  <body name="plate" euler="{tilt} 0 0">
+    <geom name="plate" type="box" size=".03 .04 .01" pos="0 0 -.0125" {collides}/><site name="top" pos="0 0 0"/></body>
+  {objects}</worldbody></mujoco>"""
+BOX = '<body name="box" pos="{x} {y} {z}"><freejoint/><geom type="box" size=".005 .006 .01" mass="{mass}"/></body>'
+NO_CONTACT = 'contype="0" conaffinity="0"'
+BALL = '<body name="ball" pos="-.005 -.012 .0061"><freejoint/><geom type="sphere" size=".006" mass=".2"/></body>'
+
+
+HAND = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body name="palm" pos="0 0 .2">
+  <geom type="box" size=".06 .02 .01" pos="0 0 .06" contype="0" conaffinity="0"/>
+  <body name="left" pos="-.0152 0 0"><joint name="left" type="slide" axis="1 0 0" damping="20"/>
+    <geom type="box" size=".005 .012 .02" pos="-.0075 0 0" mass=".1"/></body>
+  <body name="right" pos=".0152 0 0"><joint name="right" type="slide" axis="-1 0 0" damping="20"/>
+    <geom type="box" size=".005 .012 .02" pos=".0075 0 0" mass=".1"/></body></body>
+  <body name="part" pos="0 0 .2" gravcomp="1"><freejoint/><geom type="{type}" size="{size}" {turn} mass=".05"/></body></worldbody>
+  <actuator><motor joint="left" ctrlrange="0 20"/><motor joint="right" ctrlrange="0 20"/></actuator></mujoco>"""
+LEFT, RIGHT = [0, 0, 0, 0, 90, 0], [0, 0, 0, 0, -90, 0]     # z towards the other finger
+
+
+def scene(objects, *, dt=0.002, tilt=0.0, collides=""):
+    return SCENE.format(dt=dt, tilt=tilt, objects=objects, collides=collides)
+
+
+def box(mass=0.5, x=0.0, y=0.0, z=0.0101):
+    return BOX.format(mass=mass, x=x, y=y, z=z)
+
+
+def settled(model, seconds=0.4, sensors=(), each=lambda data: None):
+    """The state after a time; sensors: those that hand their force back."""
+    data = mujoco.MjData(model)
+    while data.time < seconds:
+        if sensors:
+            each(hand_back(data, sensors))
+        mujoco.mj_step(model, data)
+    return data
+
+
+@pytest.fixture(scope="module")
+def coro():
+    return softtact.load_sensor("coro")
+
+
+@pytest.fixture(scope="module")
+def weighed(coro):
+    """(reading, mass) of a box that rests on the sensor."""
+    spec = mujoco.MjSpec.from_string(scene(box(0.5)))
+    sensor = attach(spec, "plate", coro)
+    return sensor.read(settled(spec.compile())), 0.5
+
+
+def test_a_box_of_known_weight_is_read_within_two_percent(weighed):
+    reading, mass = weighed
+    assert reading.force_n == pytest.approx([0, 0, -mass * G], rel=0.02, abs=0.02 * mass * G)
+    assert list(reading.objects) == ["box"] and not reading.validity_reason
+
+
+def test_under_a_flat_contact_all_taxels_below_it_fire_and_alike(weighed, coro):
+    counts = weighed[0].tactile_map
+    taxels = coro.spec.taxels
+    x, y = (side * (np.arange(count) + 0.5 - 0.5 * count) / count for side, count in
+            zip(coro.spec.footprint_mm, (taxels.columns, taxels.rows), strict=True))
+    below = (np.abs(y)[:, None] < 6.0) & (np.abs(x) < 5.0)
+    assert below.sum() == 6 and (counts[below] > 0.5 * counts.max()).all()
+    assert counts[2, 1] == pytest.approx(counts[4, 2], rel=0.01)     # the box is in the middle: its halves read the same
+
+
+def test_the_reading_is_that_of_a_press_with_the_weight(weighed, coro):
+    exact = coro.press(body_mesh(mujoco.MjModel.from_xml_string(scene(box())), 2), force_n=weighed[1] * G, model="elastic")
+    assert weighed[0].tactile_map == pytest.approx(exact.tactile_map[0], abs=1e-3 * exact.tactile_map.max())
+    assert weighed[0].deformation_map_mm == pytest.approx(exact.deformation_map_mm[0], abs=1e-3 * exact.deformation_map_mm.max())
+    assert weighed[0].expected_error_mm == pytest.approx(exact.expected_error_mm[0], rel=1e-3)
+
+
+def test_several_objects_are_read_beside_each_other(coro):
+    spec = mujoco.MjSpec.from_string(scene(box(0.5, x=0.004, y=0.01) + BALL))
+    sensor = attach(spec, "plate", coro)
+    reading = sensor.read(settled(spec.compile()))
+    pressing = {name: -force[2] for name, force in reading.objects.items()}
+    assert pressing == pytest.approx({"box": 0.5 * G, "ball": 0.2 * G}, rel=0.02)
+    assert reading.tactile_map[0:2, 0].sum() > 50 and reading.tactile_map[4:, 2:].sum() > 50
+
+
+def test_only_named_objects_count(coro):
+    spec = mujoco.MjSpec.from_string(scene(box(0.5, x=0.004, y=0.01) + BALL))
+    sensor = attach(spec, "plate", coro, objects=["ball"])
+    assert list(sensor.read(settled(spec.compile())).objects) == ["ball"]
+
+
+@pytest.mark.parametrize(("dt", "mass"), [(0.002, 0.02), (0.005, 0.5)])     # unstable as an explicit force above 0.5 ms
+def test_the_force_of_a_sensor_carries_a_box_in_place_of_the_engine_s_contact(coro, dt, mass):
+    spec = mujoco.MjSpec.from_string(scene(box(mass, x=0.002, y=0.003), dt=dt, collides=NO_CONTACT))
+    sensor = attach(spec, "plate", coro, source="poses", friction=0.5)
+    pushed = []
+    data = settled(spec.compile(), 50 * dt, [sensor], pushed.append)
+    assert pushed[-1]["box"] == pytest.approx([0, 0, mass * G], abs=1e-3 * mass * G)
+    assert sensor.read(data).force_n == pytest.approx([0, 0, -mass * G], rel=0.02)
+    assert np.abs(data.qvel).max() < 1e-2
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, False), (0.2, True)])
+def test_a_box_on_a_tilted_sensor_slides_where_friction_is_less_than_the_slope(coro, friction, slides):
+    slope, along, seconds = np.radians(17.0), Rotation.from_euler("x", 17.0, degrees=True), 0.05     # tan = 0.306
+    _, y, z = along.apply([0.0, 0.006, 0.00997])     # about as deep as its weight takes it
+    tilted = scene(box(0.3, y=y, z=z).replace('"box"', '"box" euler="17 0 0"', 1), tilt=17.0, collides=NO_CONTACT)
+    model = mujoco.MjModel.from_xml_string(tilted)
+    data = settled(model, seconds, [attach(model, "plate", coro, source="poses", friction=friction)])
+    foot = data.body("box").xpos + data.body("box").xmat.reshape(3, 3) @ [0.0, 0.0, -0.01]
+    free_mm = 0.5e3 * G * (np.sin(slope) - friction * np.cos(slope)) * seconds**2
+    assert 6.0 - 1e3 * along.inv().apply(foot)[1] == pytest.approx(free_mm if slides else 0.0, abs=0.15)     # in shear: 0.03
+
+
+def test_a_depth_is_read_as_the_press_that_is_as_deep(coro):
+    model = mujoco.MjModel.from_xml_string(scene(BALL, collides=NO_CONTACT))
+    data = mujoco.MjData(model)
+    data.qpos[:3] = [0.0, 0.0, 0.0059]
+    mujoco.mj_forward(model, data)
+    reading = attach(model, "plate", coro, source="poses").read(data)
+    exact = coro.press(body_mesh(model, 2), force_n=-reading.force_n[2], model="elastic")
+    assert exact.indentation_mm[0] == pytest.approx(0.1, rel=0.01) and -reading.force_n[2] > 0.1
+
+
+def grip(coro, shape, size, turn="", *, seconds=0.3, **options):
+    spec = mujoco.MjSpec.from_string(HAND.format(type=shape, size=size, turn=turn))
+    sensors = [attach(spec, finger, coro, pose=pose, **options) for finger, pose in (("left", LEFT), ("right", RIGHT))]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 5.0
+    while data.time < seconds:
+        if options:
+            hand_back(data, sensors)
+        mujoco.mj_step(model, data)
+    return [sensor.read(data) for sensor in sensors]
+
+
+@pytest.mark.parametrize(("shape", "size", "turn"), [
+    ("box", ".015 .006 .008", ""), ("sphere", ".015", ""), ("ellipsoid", ".015 .02 .01", ""),
+    ("capsule", ".015 .01", ""), ("cylinder", ".008 .015", 'euler="0 90 0"')])
+def test_both_fingers_of_a_hand_read_the_force_of_their_motors_on_every_shape(coro, shape, size, turn):
+    left, right = grip(coro, shape, size, turn)
+    assert -left.force_n[2] == pytest.approx(5.0, rel=0.02) and -right.force_n[2] == pytest.approx(5.0, rel=0.02)
+    assert not left.validity_reason and left.tactile_map.sum() == pytest.approx(right.tactile_map.sum(), rel=0.02)
+
+
+def test_a_hand_holds_a_part_by_the_forces_of_its_sensors(coro):
+    left, right = grip(coro, "box", ".015 .006 .008", source="poses", seconds=0.02)
+    assert -left.force_n[2] == pytest.approx(5.0, rel=0.02) and -right.force_n[2] == pytest.approx(5.0, rel=0.02)
+
+
+def test_a_mesh_is_pressed_in_its_true_shape(coro):
+    spec = mujoco.MjSpec.from_string(scene(""))
+    part = spec.worldbody.add_body(name="part", pos=[0, 0, 0.02])
+    import trimesh
+
+    stand = trimesh.creation.box((16, 16, 4), transform=trimesh.transformations.translation_matrix([0, 0, 6]))
+    feet = [trimesh.creation.box((3, 16, 4), transform=trimesh.transformations.translation_matrix([x, 0, 2])) for x in (-6.5, 6.5)]
+    mesh = trimesh.util.concatenate([stand, *feet])
+    spec.add_mesh(name="part", uservert=(1e-3 * mesh.vertices).ravel(), userface=mesh.faces.ravel())
+    part.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="part", mass=0.1)
+    model = spec.compile()
+    found = body_mesh(model, 2)
+    assert found.bounds == pytest.approx(mesh.bounds, abs=1e-5) and found.volume == pytest.approx(mesh.volume, rel=1e-5)
+
+
+def test_a_gel_with_a_camera_sees_what_touches_it(tmp_path):
+    (tmp_path / "gel.yaml").write_text(SMALL_GEL)
+    gel = softtact.load_sensor(tmp_path / "gel.yaml")
+    spec = mujoco.MjSpec.from_string(scene(box(0.2), tilt=5.0))
+    sensor = attach(spec, "plate", gel, friction=0.8)
+    model = spec.compile()
+    free = sensor.read(settled(model, 0.001))
+    reading = sensor.read(settled(model, 0.05))
+    assert reading.force_n[2] < -1.0 and reading.deformation_map_mm.max() > 0.01
+    assert np.abs(reading.readings["camera"].astype(int) - free.readings["camera"]).max() > 20
+
+
+def test_the_sensor_s_frame_may_be_that_of_a_site_and_the_body_s_own_geoms_touch(coro):
+    text = scene(box(0.5, z=0.0076)).replace('name="top" pos="0 0 0"', 'name="top" pos="0 0 -.0025"')
+    model = mujoco.MjModel.from_xml_string(text)
+    reading = attach(model, "plate", coro, pose="top").read(settled(model))
+    assert -reading.force_n[2] == pytest.approx(0.5 * G, rel=0.02)
+
+
+def test_a_scene_that_begins_again_forgets_its_contacts(coro):
+    spec = mujoco.MjSpec.from_string(scene(box(0.5), collides=NO_CONTACT))
+    sensor = attach(spec, "plate", coro, source="poses")
+    model = spec.compile()
+    runs = [settled(model, 0.03, [sensor]).qpos.copy() for _ in range(2)]
+    assert (runs[0] == runs[1]).all()
+
+
+@pytest.mark.parametrize(("given", "sentence"), [
+    ({"body": "finger"}, "The scene has no body 'finger'; use one of world, plate, box"),
+    ({"pose": [0, 0, 0, 180, 0, 0]}, "The sensor's frame on the body 'plate' points into the body: its z axis must point out"),
+    ({"pose": "tip"}, "pose='tip': the body 'plate' has no such site"),
+    ({"source": "depth"}, "source='depth': use one of contacts, poses"),
+    ({"press": "hyperelastic"}, "press='hyperelastic': a sensor in a scene is pressed with 'elastic', or 'foundation'"),
+    ({"press": "foundation", "source": "poses"}, "press='foundation': a sensor in a scene"),
+    ({"objects": ["world"]}, "The body 'world' has a geom of type 'plane', which a sensor cannot press; use a box"),
+    ({"objects": ["bare"]}, "The body 'bare' has no geom that a sensor can press"),
+    ({"friction": -1.0}, "friction=-1.0: give a finite number"),
+    ({"sensor": "gelsight_mini", "source": "poses"}, "source='poses': gelsight_mini is a gel, which follows contact forces alone")])
+def test_what_cannot_be_attached_is_refused_in_one_sentence(coro, given, sentence):
+    text = scene(box() + '<body name="bare"/>' + '<geom type="plane" size="1 1 1" pos="0 0 -.1"/>')
+    with pytest.raises(InputError, match=sentence):
+        attach(mujoco.MjModel.from_xml_string(text), **{"body": "plate", "sensor": coro, "pose": [0, 0, -2.5, 0, 0, 0]} | given)
+
+
+def test_a_force_that_the_engine_gives_already_is_not_given_again(coro):
+    model = mujoco.MjModel.from_xml_string(scene(box(0.5, z=0.0076)))
+    sensor = attach(model, "plate", coro, pose=Pose(np.array([0, 0, -2.5])), source="poses")
+    data = settled(model)
+    with pytest.raises(InputError, match="hand_back: the engine, too, pushes 'box' off 'plate'; set contype"):
+        hand_back(data, [sensor])
+
+
+def test_a_sensor_that_reads_forces_hands_none_back(coro):
+    model = mujoco.MjModel.from_xml_string(scene(box()))
+    with pytest.raises(InputError, match="reads the engine's own contact forces; attach it with source='poses'"):
+        hand_back(mujoco.MjData(model), [attach(model, "plate", coro)])
