@@ -4,7 +4,7 @@ Lengths of MuJoCo are taken to be in m; meshes are in mm, in the body's frame.
 """
 
 from collections.abc import Callable, Collection, Iterator
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -59,8 +59,7 @@ def body_mesh(model: Any, body: int) -> trimesh.Trimesh:
     if not parts:
         raise InputError(f"The body {name_of(model, body)!r} has no geom that a sensor can press; give it one, or leave it out of "
                          "'objects'.")
-    whole: trimesh.Trimesh = trimesh.util.concatenate(parts)
-    return whole
+    return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
 
 
 def _geom_mesh(model, body, geom):
