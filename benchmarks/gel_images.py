@@ -2,7 +2,8 @@
 
 A ball of 4 mm is pressed 1 mm deep into gelsight_mini and moved aside by 1 mm; the press itself is not timed. Then the image with
 7 x 9 solved markers is drawn again and again on one core, at the sensor's pixels and at 640 x 480, with each kind of shading.
-Parts: slopes of the map, search of the pixels' points, markers, colours. Accuracy: the same image with every pixel's ray searched,
+`shadows`: the table, and a shadow of a lamp for each channel. Parts: slopes of
+the map, shadows, search of the pixels' points, markers, colours. Accuracy: the same image with every pixel's ray searched,
 and the shading's own formula. With `--taxim`, the folder of PyPI's unpacked wheel of `taxim` (1.4.1, MIT): its torch path, without
 shadows and without markers, at its own 640 x 480, in the same run (torchvision's resize, of which it caches the result, is stood in
 for by torch's). Times are seconds of the process, with OMP_NUM_THREADS=1. Writes benchmarks/results/gel_images.json; a minute.
@@ -22,10 +23,13 @@ import softtact
 from softtact.imaging import gel_image
 from softtact.imaging.pinhole import Pinhole
 from softtact.imaging.shading import KINDS, ShadingSamples
+from softtact.imaging.shadows import Lamps, dimming_of
 from softtact.readout.camera import Camera
 from softtact.readout.relief import Relief
 
 FRAMES = 60
+SHADOWS = "shadows"
+LAMPS = Lamps(np.deg2rad([0.0, 120.0, 240.0]), np.full(3, 0.2), np.full(3, 0.2), np.full(3, 0.3))
 SIZES = {"320 x 240": (320, 240, 0.0634), "640 x 480": (640, 480, 0.0317)}
 
 
@@ -48,18 +52,21 @@ def shading_of(kind, pixels):
     return KINDS[kind].fit(ShadingSamples(slope_x, slope_y, x, y, colours.T), pixels, background)
 
 
-def frame(relief, camera, markers, places, table, background):
-    """One image, its slopes, and the seconds (4,) of its parts on the processor."""
+def frame(relief, camera, markers, places, table, background, lamps):
+    """One image, the map's slopes and dimming, light past the markers, and the seconds (5,) of its parts on the processor."""
     step, at = gel_image.pixel_step(relief, camera), [time.process_time()]
-    slopes = gel_image.slopes_of(relief, camera.turn)
+    fields = gel_image.slopes_of(relief, camera.turn)
     at.append(time.process_time())
-    seen = gel_image.seen(relief, camera, slopes, step=step)
+    if lamps is not None:
+        fields = np.concatenate([fields, dimming_of(relief, lamps, fields, camera.turn)], axis=2)
+    at.append(time.process_time())
+    seen = gel_image.seen(relief, camera, fields, step=step)
     at.append(time.process_time())
     light = gel_image.light_past_markers(relief, camera, markers, places)
     at.append(time.process_time())
-    image = gel_image.colours_by_table(seen, step, table, background, light)
+    image = gel_image.colours_by_table(seen[..., :2], step, table, background, light, None if lamps is None else seen[..., 2:])
     at.append(time.process_time())
-    return image, slopes, light, np.diff(at)
+    return image, fields, light, np.diff(at)
 
 
 def timed(relief, readout, size, kind):
@@ -67,15 +74,18 @@ def timed(relief, readout, size, kind):
     columns, rows, mm_per_px = SIZES[size]
     camera = Pinhole(rows, columns, mm_per_px, readout.distance_mm, axes=readout.axes)
     places = Camera.model_copy(readout, update={"pixels": (columns, rows), "mm_per_px": mm_per_px}).markers_mm()
-    shading = shading_of(kind, (columns, rows))
+    lamps = LAMPS if kind == SHADOWS else None
+    shading = shading_of("table" if lamps is not None else kind, (columns, rows))
     table, background = gel_image.tabulate(shading, camera), np.full((rows, columns, 3), 130.0, dtype=np.float32)
-    given = (relief, camera, readout.markers, places, table, background)
+    given = (relief, camera, readout.markers, places, table, background, lamps)
     frame(*given)
     seconds = np.array([frame(*given)[3] for _ in range(FRAMES)])
-    image, slopes, light, _ = frame(*given)
-    exact = gel_image.colours_by_formula(gel_image.seen(relief, camera, slopes), shading, background, light)
+    image, fields, light, _ = frame(*given)
+    seen = gel_image.seen(relief, camera, fields)
+    exact = gel_image.colours_by_formula(seen[..., :2], shading, background, light, None if lamps is None else seen[..., 2:])
     off = np.abs(image.astype(int) - exact)
-    parts = dict(zip(("slopes", "rays", "markers", "colours"), np.median(1e3 * seconds, axis=0).round(2).tolist(), strict=True))
+    medians = np.median(1e3 * seconds, axis=0).round(2).tolist()
+    parts = dict(zip(("slopes", "shadows", "rays", "markers", "colours"), medians, strict=True))
     whole = 1e3 * seconds.sum(axis=1)
     return {"ms": round(float(np.median(whole)), 2), "fastest_ms": round(float(whole.min()), 2), "parts_ms": parts,
             "mean_error_levels": round(float(off.mean()), 4), "largest_error_levels": int(off.max())}
@@ -122,7 +132,7 @@ def main():
     parser.add_argument("--taxim", type=Path, help="folder of the unpacked wheel")
     options = parser.parse_args()
     relief, readout = pressed()
-    found = {f"{size}, {kind}": timed(relief, readout, size, kind) for size in SIZES for kind in KINDS}
+    found = {f"{size}, {kind}": timed(relief, readout, size, kind) for size in SIZES for kind in (*KINDS, SHADOWS)}
     if options.taxim:
         found["taxim, torch path"] = taxim(options.taxim)
     record.write("gel_images", frames=FRAMES, threads=1, clock="seconds of the process", images=found)

@@ -109,6 +109,23 @@ def test_a_background_image_is_taken_pixel_by_pixel(tmp_path):
     assert np.array_equal(read(mine, "camera", surface_of(mine, dent(mine))).values[0], picture)
 
 
+def test_a_shading_with_lamps_darkens_the_gel_beside_a_dent_and_leaves_the_rest(tmp_path):
+    from softtact.imaging.shading import Shading
+    from softtact.imaging.shadows import Lamps
+
+    plain = Shading.load("gelsight_mini")
+    lamps = Lamps(np.zeros(3), np.full(3, 0.2), np.full(3, 0.1), np.array([0.4, 0.0, 0.0]))
+    type(plain)(**vars(plain) | {"lamps": lamps}).save(tmp_path / "lit.yaml")
+    plain.save(tmp_path / "plain.yaml")
+    images = []
+    for name in ("plain.yaml", "lit.yaml"):
+        own = gel_spec(markers="none", shading=str(tmp_path / name), pixels=[256, 192])
+        images.append(read(own, "camera", surface_of(own, dent(own, depth=1.5, width=2.0))).values[-1].astype(int))
+    lost = images[0] - images[1]
+    assert lost[..., 0].max() > 15 and not lost[..., 1:].any()
+    assert (lost[..., 0] > 1).mean() < 0.3 and lost.min() >= 0
+
+
 # --- depth ---
 
 

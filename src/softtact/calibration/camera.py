@@ -21,6 +21,7 @@ from scipy.signal import fftconvolve
 
 from softtact.errors import InputError
 from softtact.imaging.ball_presses import BallPress, Gel, joined_samples, refined_circle
+from softtact.imaging.ball_shadows import AROUND, with_lamps
 from softtact.imaging.markers import read_image
 from softtact.imaging.reading import image_files
 from softtact.imaging.shading import KINDS, QuadraticShading, Shading
@@ -53,7 +54,7 @@ class CameraCalibration:
     found: bool
     """Whether the circles were found in the images, not stated."""
     shading: Shading
-    """Fitted to all presses."""
+    """Fitted to all presses, with lamps where their shadows are seen around the contacts."""
     background: np.ndarray
     """(rows, columns, 3) uint8, the untouched gel."""
     ball_px: float
@@ -183,6 +184,7 @@ def calibrate_camera(presses: Sequence[BallPress], background: np.ndarray, *, ba
         scale = find_scale(moved, **options)
         gel = _gel(scale, **options)
     shading = _fit(kind, moved, gel, background)
+    shading = replace(shading, lamps=with_lamps(shading, moved, gel, reach=[AROUND] * len(moved)))
     error = _error_on_others(kind, moved, gel, background)
     facts = {"made_by": "softtact calibrate-camera", "presses": len(moved), "ball_mm": ball_mm, "mm_per_px": round(scale, 6),
              "thickness_mm": thickness_mm, "error_levels": round(error, 3)}

@@ -111,6 +111,7 @@ def _summary(found, files):
 
     return {"presses": len(found.presses), "circles_found": found.found, "mm_per_px": found.mm_per_px,
             "mm_per_px_found": found.scale_found, "ball_px": found.ball_px, "shading": found.shading.kind,
+            "shadow_strength": None if found.shading.lamps is None else found.shading.lamps.strength.tolist(),
             "error_levels": found.error_levels, "covered_share": covered_share(found.presses),
             "circles": [{"image": Path(press.name).name, "centre_x_px": press.centre_px[0], "centre_y_px": press.centre_px[1],
                          "radius_px": press.radius_px} for press in found.presses],
@@ -122,6 +123,9 @@ def _lines(summary):
     yield (f"presses: {summary['presses']}; a pixel is {summary['mm_per_px']:.4g} mm ({how}), the ball {summary['ball_px']:.4g} px "
            "in radius")
     yield f"error of the shading on presses that it was not fitted to: {summary['error_levels']:.2f} grey levels in the contact"
+    strength = summary["shadow_strength"]
+    yield ("no shadows are seen around the contacts" if strength is None else "shadows around the contacts take up to "
+           + ", ".join(f"{share:.0%} of {name}" for share, name in zip(strength, ("red", "green", "blue"), strict=True)))
     yield (f"the contacts spread over {summary['covered_share']:.0%} of the image; press in its corners, too, as what lies beyond "
            "them is extrapolated")
     yield f"{'image':28}{'column, px':>12}{'row, px':>12}{'radius, px':>12}"

@@ -16,6 +16,7 @@ from softtact.imaging.shading import Shading, ShadingSamples
 from softtact.models.elastic.ball_on_layer import BallOnLayer
 
 _PROFILE = 90       # distances at which the layer's profile is computed, between which it is linear
+_INSIDE = 60        # distances inside the contact, for heights
 _LAYERS = 17        # layers for which it is computed
 _THINNESS = (0.02, 9.0)     # contact radius over the layer's thickness: at the least, a half-space
 
@@ -105,6 +106,14 @@ def ball_slopes(x_px: np.ndarray, y_px: np.ndarray, contact_px: float, gel: Gel)
                              edge * _outside(distance / contact_px, contact_px / gel.thickness_px, gel.poisson)
                              / np.maximum(distance, 1e-9))
     return np.stack([over_distance * x_px, over_distance * y_px], axis=-1)
+
+
+def ball_heights(distance_px: np.ndarray, contact_px: float, gel: Gel) -> np.ndarray:
+    """Heights (...) at distances from the contact's centre, below 0; 0 far away. Raises InputError as `ball_slopes` does."""
+    places = contact_px * np.concatenate([np.linspace(0, 1, _INSIDE, endpoint=False), _ratios()])
+    slopes = ball_slopes(places, np.zeros(len(places)), contact_px, gel)[:, 0]
+    rise = np.concatenate([[0.0], np.cumsum(0.5 * (slopes[1:] + slopes[:-1]) * np.diff(places))])
+    return np.interp(distance_px, places, rise - rise[-1])
 
 
 def _outside(ratio, thinness, poisson):

@@ -154,23 +154,28 @@ def tabulate(shading: Shades, camera: Pinhole) -> ShadingTable | None:
     return None
 
 
-def colours_by_table(slopes: np.ndarray, step: int, table: ShadingTable, background: np.ndarray, light: np.ndarray) -> np.ndarray:
+def colours_by_table(slopes: np.ndarray, step: int, table: ShadingTable, background: np.ndarray, light: np.ndarray,
+                     dimming: np.ndarray | None = None) -> np.ndarray:
     """(rows, columns, 3) uint8 of slopes at each `step`-th pixel (see `seen`).
 
     background: (rows, columns, 3) grey levels of the untouched gel;  light: (rows, columns) share that markers leave
+    dimming: (rows, columns, 3) share that shadows take, at the pixels of the slopes; by default none
     """
     image = np.empty((*light.shape, 3), dtype=np.uint8)
     tilts = (slopes / np.sqrt(1 + (slopes**2).sum(axis=2, keepdims=True))).astype(np.float32)
     difference = np.empty((*tilts.shape[:2], 4), dtype=np.float32)
     _look_up(tilts, step, table.values, table.degree, table.middle, 1 / table.unit, difference)
-    _colour(difference, step, background, light, image)
+    shadows = np.zeros((*tilts.shape[:2], 3), dtype=np.float32) if dimming is None else np.ascontiguousarray(dimming)
+    _colour(difference, shadows, step, background, light, image)
     return image
 
 
-def colours_by_formula(slopes: np.ndarray, shading: Shades, background: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """The same by the shading's own formula, with slopes (rows, columns, 2) at each pixel."""
+def colours_by_formula(slopes: np.ndarray, shading: Shades, background: np.ndarray, light: np.ndarray,
+                       dimming: np.ndarray | None = None) -> np.ndarray:
+    """The same by the shading's own formula, with slopes (rows, columns, 2) and dimming at each pixel."""
     y, x = np.mgrid[:background.shape[0], :background.shape[1]]
     colours = np.clip(background + shading.difference(slopes[..., 0], slopes[..., 1], x, y), 0, 255)
+    colours = colours if dimming is None else colours * (1 - dimming)
     image: np.ndarray = np.round(colours * light[..., None]).astype(np.uint8)
     return image
 
@@ -317,10 +322,11 @@ def _look_up(tilts, step, table, degree, middle, over_unit, out):
 
 
 @compiled(error_model="numpy", fastmath=True)
-def _colour(difference, step, background, light, image):
-    """Colours of all pixels from differences (rows, columns, 4) at each `step`-th, linear between them."""
+def _colour(difference, dimming, step, background, light, image):
+    """Colours of all pixels from differences (rows, columns, 4) and dimming (rows, columns, 3) at each `step`-th, linear."""
     over_step, zero, most, round_up = np.float32(1 / step), np.float32(0), np.float32(255), np.float32(0.5)
     line, rise = np.empty((difference.shape[1], 3), dtype=np.float32), np.zeros((difference.shape[1], 3), dtype=np.float32)
+    lit, lit_rise = np.empty_like(line), np.zeros_like(line)
     for row in range(image.shape[0]):
         at = row // step
         share = (row - at * step) * over_step
@@ -328,16 +334,19 @@ def _colour(difference, step, background, light, image):
         for k in range(line.shape[0]):
             for c in range(3):
                 line[k, c] = difference[at, k, c] + share * (difference[below, k, c] - difference[at, k, c])
+                lit[k, c] = np.float32(1) - dimming[at, k, c] - share * (dimming[below, k, c] - dimming[at, k, c])
         for k in range(line.shape[0] - 1):
             for c in range(3):
                 rise[k, c] = over_step * (line[k + 1, c] - line[k, c])
+                lit_rise[k, c] = over_step * (lit[k + 1, c] - lit[k, c])
         for k in range(line.shape[0]):
             for phase in range(min(step, image.shape[1] - k * step)):
                 column, far = k * step + phase, np.float32(phase)
                 left = light[row, column]
                 for c in range(3):
                     value = background[row, column, c] + line[k, c] + far * rise[k, c]
-                    image[row, column, c] = np.uint8(min(max(value, zero), most) * left + round_up)
+                    shade = (lit[k, c] + far * lit_rise[k, c]) * left
+                    image[row, column, c] = np.uint8(min(max(value, zero), most) * shade + round_up)
 
 
 @compiled(error_model="numpy", inline="always")

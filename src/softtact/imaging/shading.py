@@ -28,6 +28,7 @@ from scipy.optimize import least_squares
 
 from softtact.errors import InputError
 from softtact.files import atomic_path, digest, read_yaml
+from softtact.imaging.shadows import Lamps
 
 CHANNELS = 3
 SHIPPED = Path(str(resources.files("softtact.imaging"))) / "data"
@@ -68,6 +69,8 @@ class Shading(ABC):
     """(term, 3) background as a polynomial in the place, for drawing without an image of the untouched gel."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """Where the numbers come from: fitted or assumed, to what, with which error."""
+    lamps: Lamps | None = field(default=None, kw_only=True)
+    """What throws shadows; None: no shadows."""
 
     def difference(self, slope_x: np.ndarray, slope_y: np.ndarray, x_px: np.ndarray, y_px: np.ndarray) -> np.ndarray:
         """Colour minus background (..., 3) in grey levels, not cut; all arguments are of one shape or broadcast."""
@@ -79,13 +82,15 @@ class Shading(ABC):
         """The model that fits some samples best.  background: (rows, columns, 3), the image of the untouched gel."""
 
     def colours(self, slope_x: np.ndarray, slope_y: np.ndarray, x_px: np.ndarray, y_px: np.ndarray,
-                background: np.ndarray | None = None) -> np.ndarray:
+                background: np.ndarray | None = None, dimming: np.ndarray | None = None) -> np.ndarray:
         """Colours (..., 3) as floats 0 ... 255 at places (...) of the image, where the surface has slopes (...).
 
         background: (..., 3) colours there without contact; by default the model's smooth background
+        dimming: (..., 3) share that cast shadows take, see `softtact.imaging.shadows`; by default none
         """
         known = self.background(x_px, y_px) if background is None else background
-        return np.clip(known + self.difference(slope_x, slope_y, x_px, y_px), 0.0, 255.0)
+        lit = np.clip(known + self.difference(slope_x, slope_y, x_px, y_px), 0.0, 255.0)
+        return lit if dimming is None else lit * (1 - dimming)
 
     def on_grid(self, pixels: tuple[int, int], background: np.ndarray | None = None) -> ShadedGrid:
         """The model at all pixels of an image, prepared once for many frames.  background: as for `colours`"""
@@ -126,7 +131,8 @@ class Shading(ABC):
     def values(self) -> dict[str, Any]:
         """The model as plain values, for a file."""
         own = {name: _rounded(getattr(self, name)) for name in _fields(type(self))}
-        return {"kind": self.kind} | own
+        lamps = {} if self.lamps is None else {"lamps": {name: _rounded(value) for name, value in vars(self.lamps).items()}}
+        return {"kind": self.kind} | own | lamps
 
     def save(self, path: str | Path) -> None:
         """Write the model as YAML with its provenance and a digest of its numbers."""
@@ -171,7 +177,7 @@ def _from_values(values, path):
     if stated is not None and stated != digest(values):
         raise InputError(f"{path}, field 'digest': the numbers are not those that were written; delete the field if you edited "
                          "them on purpose.")
-    kind = KINDS[values.pop("kind")]
+    kind, lamps = KINDS[values.pop("kind")], values.pop("lamps", None)
     wanted = set(_fields(kind))
     if set(values) != wanted:
         raise InputError(f"{path}, field {sorted(set(values) ^ wanted)[0]!r}: a shading of kind {kind.kind} has the fields "
@@ -179,13 +185,14 @@ def _from_values(values, path):
     try:
         arrays = {name: np.array(value, dtype=float) for name, value in values.items() if name != "pixels"}
         arrays = {name: value if value.ndim else value.item() for name, value in arrays.items()}
-        return kind(pixels=tuple(map(int, values["pixels"])), provenance=provenance, **arrays)
+        return kind(pixels=tuple(map(int, values["pixels"])), provenance=provenance,
+                    lamps=None if lamps is None else Lamps.of(lamps), **arrays)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{path}: a field holds no numbers ({error}); write the file anew.") from None
+        raise InputError(f"{path}: a field holds no such numbers ({error}); write the file anew.") from None
 
 
 def _fields(kind):
-    return [one.name for one in fields(kind) if one.name != "provenance"]
+    return [one.name for one in fields(kind) if one.name not in ("provenance", "lamps")]
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from softtact.imaging import gel_image
 from softtact.imaging.gel_image import Relief, ShadingTable
 from softtact.imaging.pinhole import Pinhole
 from softtact.imaging.shading import Shading
+from softtact.imaging.shadows import dimming_of
 from softtact.readout.registry import SurfaceMotion, labelled, make_readout, register
 from softtact.readout.relief import reliefs
 from softtact.sensors.base import Specification
@@ -146,11 +147,16 @@ class Painter:
     def image(self, relief: Relief) -> np.ndarray:
         """(rows, columns, 3) uint8 of the surface at a load step."""
         step = gel_image.pixel_step(relief, self.pinhole)
-        slopes = gel_image.seen(relief, self.pinhole, gel_image.slopes_of(relief, self.pinhole.turn), step=step)
+        fields = gel_image.slopes_of(relief, self.pinhole.turn)
+        if self.shading.lamps is not None:
+            fields = np.concatenate([fields, dimming_of(relief, self.shading.lamps, fields, self.pinhole.turn)], axis=2)
+        seen = gel_image.seen(relief, self.pinhole, fields, step=step)
         light = gel_image.light_past_markers(relief, self.pinhole, self.camera.markers, self.markers_mm)
+        seen = seen if self.table is not None else gel_image.between(seen, self.pinhole, step)
+        slopes, dimming = seen[..., :2], seen[..., 2:] if self.shading.lamps is not None else None
         if self.table is None:
-            return gel_image.colours_by_formula(gel_image.between(slopes, self.pinhole, step), self.shading, self.background, light)
-        return gel_image.colours_by_table(slopes, step, self.table, self.background, light)
+            return gel_image.colours_by_formula(slopes, self.shading, self.background, light, dimming)
+        return gel_image.colours_by_table(slopes, step, self.table, self.background, light, dimming)
 
 
 @functools.lru_cache(maxsize=8)
