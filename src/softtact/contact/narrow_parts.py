@@ -14,7 +14,7 @@ from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 if TYPE_CHECKING:
     from softtact.contact.node_grid import NodeGrid
 
-_SPACING = 0.5     # of a step: distance of points along an edge, so that none of the cells that it crosses is left out
+SPACING = 0.5     # of a step: distance of points along an edge, so that none of the cells that it crosses is left out
 SEEN = 0.6         # slope between a node and a point up to which both belong to one part; a surface without an edge is less steep
 
 
@@ -33,7 +33,7 @@ def lowest_missed(surface: HeightField, grid: "NodeGrid", gap_mm: np.ndarray, be
 
 def along_edges_over(surface: HeightField, grid: "NodeGrid", below_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (k, 3) along the edges of an object's facets below a height, over a grid; and the node (k,) nearest to each."""
-    points = surface.along_edges(below_mm, _SPACING * grid.step.min())
+    points = surface.along_edges(below_mm, SPACING * grid.step.min())
     last = np.array(grid.shape[::-1]) - 1
     place = (points[:, :2] - grid.points[0]) / grid.step
     inside = ((place > -0.5) & (place < last + 0.5)).all(axis=1)

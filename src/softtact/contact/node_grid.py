@@ -116,6 +116,11 @@ class Stencil:
 
     def on(self, grid: NodeGrid, nodes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The stencil's product with values (n, load steps) at nodes (n,) of a `NodeGrid`; all other nodes are zero."""
+        neighbours, weights = self.around(grid, nodes)
+        return lambda x: apply_stencil(np.ascontiguousarray(x, dtype=np.float32), neighbours, weights)
+
+    def around(self, grid: NodeGrid, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """For nodes (n,) of a `NodeGrid`: indices (n, k) of their neighbours among these, -1 for none, and the weights (n, k)."""
         reach = self.values.shape[2] // 2
         j, i = np.divmod(nodes, grid.shape[1])
         place = np.full((grid.shape[0] + 2 * reach, grid.shape[1] + 2 * reach), -1)
@@ -123,12 +128,12 @@ class Stencil:
         kind = (j - grid.shape[0] // 2) % 2, (i - grid.shape[1] // 2) % 2
         offsets = [(dj, di) for dj in range(2 * reach + 1) for di in range(2 * reach + 1)]
         neighbours = np.stack([place[j + dj, i + di] for dj, di in offsets], axis=1)
-        weights = np.stack([self.values[(*kind, dj, di)] for dj, di in offsets], axis=1).astype(np.float32)
-        return lambda x: _apply(np.ascontiguousarray(x, dtype=np.float32), neighbours, weights)
+        return neighbours, np.stack([self.values[(*kind, dj, di)] for dj, di in offsets], axis=1).astype(np.float32)
 
 
 @compiled
-def _apply(x, neighbours, weights):
+def apply_stencil(x: np.ndarray, neighbours: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Sums (n, m) over values (n, m) of the neighbours (n, k) with weights (n, k); an index of -1 is none."""
     out = np.zeros_like(x)
     for n in range(len(neighbours)):
         for k in range(neighbours.shape[1]):

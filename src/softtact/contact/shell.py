@@ -38,12 +38,18 @@ class Shell:
         """
         if not np.isfinite(self.below_mm):
             return np.inf
-        inner = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM
-        outer, offset = inner + self.width_mm, np.asarray(offset_mm)
-        boxes = [(-outer, [-inner[0], outer[1]]), ([inner[0], -outer[1]], outer),
-                 ([-inner[0], -outer[1]], [inner[0], -inner[1]]), ([-inner[0], inner[1]], [inner[0], outer[1]])]
-        lowest = min(surface.lowest_over(low - offset, high - offset) for low, high in boxes)
+        offset = np.tile(np.asarray(offset_mm)[:, None], 2)
+        lowest = min(surface.lowest_over(*(box.reshape(2, 2) - offset).T) for box in self.boxes)
         return lowest + self.below_mm if lowest < NO_CONTACT_MM else np.inf
+
+    @property
+    def boxes(self) -> np.ndarray:
+        """Rectangles (4, 4) of its top: low and high x, low and high y in mm; none (0, 4) where there is no shell."""
+        if not self.exists:
+            return np.zeros((0, 4))
+        inner = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM
+        (x, y), (far_x, far_y) = inner, inner + self.width_mm
+        return np.array([[-far_x, -x, -far_y, far_y], [x, far_x, -far_y, far_y], [-x, x, -far_y, -y], [-x, x, y, far_y]])
 
     @property
     def exists(self) -> bool:

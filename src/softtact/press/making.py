@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
     from softtact.sensors.specification import AnySpec
 
-_NEGLIGIBLE = 1e-6     # of a force: largest share on the shell without a warning
+RESTS = 1e-6     # of a force: share on the shell from which on an object rests on it
 
 
 def shell_of(sensor: "Sensor") -> Shell:
@@ -91,7 +91,7 @@ def _calibration(spec):
 
 def warn_of_shell(spec: "AnySpec", forces: np.ndarray, on_pad: np.ndarray) -> None:
     """Warn of the first load step at which the shell carries a part of the forces (l,) in N, the pad the rest."""
-    resting = np.flatnonzero(forces - on_pad > _NEGLIGIBLE * forces)
+    resting = np.flatnonzero(forces - on_pad > RESTS * forces)
     if len(resting):
         first = resting[0]
         warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which carries {on_pad[first]:.3g} N "

@@ -1,33 +1,29 @@
-"""Many presses at once: in parallel processes that share the sensor's prepared models, or as one batch on a GPU."""
+"""Many presses at once: in processes that share the sensor's prepared models; the elastic model's as batches, also on a GPU."""
 
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
 
-from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.contact.underside import Underside
-from softtact.contact.unilateral import not_settled
+from softtact.contact.undersides import ObjectSurface
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
-from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
-from softtact.press.choice import models_to_prepare, with_expected_error
-from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
+from softtact.press.batch import press_together, together, warn_of_shells
+from softtact.press.choice import models_to_prepare
 from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
 from softtact.press.task import cores
-from softtact.press.validity import flag_buried
 from softtact.processes import map_in_processes
 from softtact.progress import progress
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
+_PART = 64     # presses of one problem in a process
 _PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": ("foundation",)}
 
 
@@ -68,9 +64,9 @@ def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh | SoftObject, 
 
 def _pressed_all(sensor, jobs, batch):
     model, device = batch.model, batch.device
-    if jobs and on_gpu(device, model) and sensor.spec.base_held and not sensor.spec.edge.far:   # no free lower side
-        return press_batch(sensor, jobs, batch.force_n, device="cuda" if device == "auto" else device, workers=batch.workers,
-                           label=batch.label)
+    gpu = bool(jobs) and on_gpu(device, model)
+    if jobs and model == "elastic" and together(sensor) and not any(isinstance(mesh, SoftObject) for mesh, _ in jobs):
+        return _pressed_together(sensor, jobs, batch, device=("cuda" if device == "auto" else device) if gpu else "cpu")
     prepared = _PREPARED.get(model, ())
     if model == "auto" and sensor.spec.has_layers and sensor.spec.edge.far:
         prepared = ("elastic",)
@@ -82,6 +78,32 @@ def _pressed_all(sensor, jobs, batch):
     return list(progress(_each(sensor, act, jobs, batch.workers), label=batch.label, total=len(jobs)))
 
 
+def _pressed_together(sensor, jobs, batch, *, device):
+    """Presses of the elastic model in parts that share a problem: on the processor a few for each process."""
+    surfaces: dict[int, ObjectSurface] = {}
+    for mesh, _ in jobs:
+        if id(mesh) not in surfaces:
+            surfaces[id(mesh)] = ObjectSurface(mesh)
+    pairs = [(surfaces[id(mesh)], pose) for mesh, pose in jobs]
+    workers = batch.workers if device == "cpu" else 1
+    size = min(_PART, -(-len(pairs) // workers)) if device == "cpu" else len(pairs)
+    parts = [pairs[first:first + size] for first in range(0, len(pairs), size)]
+    act = partial(_part_pressed, force_n=batch.force_n, device=device)
+    results: list[Any] = []
+    for part in progress(_each(sensor, act, parts, workers), label=f"{batch.label}, {size} at once" if batch.label else "",
+                         total=len(parts)):
+        results += part
+    done = [one for one in results if isinstance(one, PressResult)]
+    if done:
+        warn_of_shells(sensor, *(np.array([getattr(one, name)[-1] for one in done]) for name in ("normal_force_n", "pad_force_n")))
+    return results
+
+
+def _part_pressed(sensor, pairs, *, force_n, device):
+    surfaces, poses = zip(*pairs, strict=True)
+    return press_together(sensor, surfaces, poses, force_n, device=device)
+
+
 def on_gpu(device: str, model: str) -> bool:
     """Whether presses of a model run as one batch on a GPU, if one is requested or available; only the elastic model can."""
     if device == "cpu" or (device == "auto" and model != "elastic"):
@@ -89,65 +111,6 @@ def on_gpu(device: str, model: str) -> bool:
     if model != "elastic":
         raise InputError(f"device={device!r}: only the elastic model presses on a GPU; leave it out for the model {model!r}.")
     return find_device(device) != "cpu"
-
-
-def press_batch(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh, Pose | None]], force_n: np.ndarray, *, device: str,
-                workers: int, label: str) -> list[Any]:
-    """Presses of the elastic model as columns of one problem on a torch device; an error in the place of a press that fails.
-
-    jobs: (mesh, pose) of each. Processes find their undersides.
-    """
-    from softtact.models.elastic.batch import press_layers
-
-    compliance = sensor.prepared("elastic")
-    undersides = list(_each(sensor, _underside, jobs, workers))
-    results: list[Any] = [one if isinstance(one, SofttactError) else None for one in undersides]
-    good = [number for number, one in enumerate(results) if one is None]
-    start = time.perf_counter()
-    presses = press_layers(compliance, [undersides[number].height for number in good], force_n, device=device)
-    for number, press in zip(good, progress(presses, label=label, total=len(good)), strict=True):
-        results[number] = _read(sensor, press, undersides[number], force_n, jobs[number])
-    seconds = np.full(len(force_n), (time.perf_counter() - start) / max(1, len(good) * len(force_n)))
-    return [one if isinstance(one, SofttactError) else replace(one, wall_time_s=seconds) for one in results]
-
-
-@dataclass(frozen=True)
-class _Underside:
-    """An object over the sensor."""
-
-    height: np.ndarray
-    """(n,) in mm: over the grid's nodes."""
-    touch_mm: float
-    """Descent to first touch."""
-    stop_mm: float
-    """Descent until it rests on the shell."""
-    top_mm: float
-    """Height of its top over first touch."""
-
-
-def _underside(sensor, job):
-    mesh, pose = job
-    try:
-        placed = place(mesh, pose=pose)
-        check_over_sensor(placed, sensor.spec.footprint_mm)
-        grid = sensor.prepared_models["elastic"].grid
-        surface, height = HeightField(placed), np.full(grid.count, NO_CONTACT_MM)
-        points, touch = Underside(surface, grid).nodes(sensor.spec.thickness_mm), first_touch_mm(sensor, surface)
-        height[points.nodes] = points.gap
-        return _Underside(height=height, touch_mm=touch, stop_mm=shell_stop_mm(sensor, surface),
-                          top_mm=placed.bounds[1, 2] - touch)
-    except InputError as error:
-        return error.with_traceback(None)
-
-
-def _read(sensor, press, underside, force_n, job):
-    if press.contact.depth[-1] > underside.stop_mm:     # rare: an object on the shell is pressed alone
-        return _pressed(sensor, job, force_n=force_n, model="elastic", options={})
-    settled = press.contact.settled
-    if not settled.all():
-        return ConvergenceError(not_settled(force_n[~settled][0]))
-    result = elastic_result(sensor, press, force_n, np.zeros(len(force_n)), touch_mm=underside.touch_mm)
-    return with_expected_error(sensor, flag_buried(result, underside.top_mm))
 
 
 def _each(sensor, act, jobs, workers):

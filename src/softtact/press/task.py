@@ -53,8 +53,8 @@ class BatchOptions(TypedDict, total=False):
     workers: int | None
     """Processes; by default one for each core."""
     device: str
-    """`cuda`, or `auto` where there is a GPU, runs all presses of the elastic model on it as one batch; presses of the other
-    models, and those on the `cpu`, run in processes."""
+    """`cuda`, or `auto` where there is a GPU, runs the elastic model's batch on it; on the `cpu` its batches, and the presses of
+    the other models, run in processes."""
     failures: str
     """`raise` the first, after all are done (default), or `keep` each error in its press' place."""
     label: str

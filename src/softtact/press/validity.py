@@ -113,12 +113,16 @@ def _grows(depth, *, slack_mm):
     return (depth >= deepest_before - slack_mm) & (depth <= least_after + slack_mm)
 
 
-def flag_buried(result: PressResult, top_mm: float) -> PressResult:
-    """The result with the load steps flagged at which the object's top is below the surface at rest: no model has contact on
-    that side.
+def flag_buried(result: PressResult, top_mm: float | np.ndarray) -> PressResult:
+    """The result with the load steps flagged at which the object's top, `top_mm` over first touch, is below the surface at rest: no
+    model has contact on that side.
+
+    top_mm: one for all load steps, or one for each
     """
-    return flagged(result, f"the object is {top_mm:.3g} mm high, and its top is below the surface",
-                   ~(result.indentation_mm < top_mm))
+    buried, top = ~(result.indentation_mm < top_mm), np.broadcast_to(top_mm, result.steps)
+    for height in np.unique(top[buried]) if buried.any() else top[:0]:
+        result = flagged(result, f"the object is {height:.3g} mm high, and its top is below the surface", buried & (top == height))
+    return result
 
 
 def flag_overloaded(result: PressResult, largest_n: float) -> PressResult:

@@ -1,117 +1,326 @@
-"""Many presses of the elastic model at once: a column for each press and load step, on a GPU or on any device of torch.
+"""Many presses of the elastic model at once: a column for each press and load step, in NumPy's arrays or in torch's on any device.
 
-`press_layer` gathers a dense compliance among one object's points. Here all presses share the surface: a product uses four dense
-matrices, one for each parity, on a quarter of the surface's nodes and all columns. It takes about four times the operations, but
-suits a GPU. The method is that of `contact.unilateral`, with torch's arrays.
+`press_layer` gathers a dense compliance among one object's points, which takes longer to read than to multiply with. Here all
+presses share the surface, free sides included: a product uses four dense matrices, one for each parity, on a quarter of the
+surface's nodes and all columns. Only the quarter's rectangle of nodes that the objects come near takes part.
+The method is that of `contact.unilateral`: points that penetrate join the active set, points in tension leave it, and the equations
+on a set are solved by projected conjugate gradients. A set is left as soon as its residual has fallen by a power of ten, and the
+displacement is updated by products with changes of the forces alone, so single precision serves. An object that would sink below
+the shell is held at the shell's depth, and its force follows.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import fields
+import weakref
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import torch
+from array_api_compat import array_namespace, device
 
-from softtact.contact.height_field import NO_CONTACT_MM
-from softtact.contact.unilateral import ContactLoadSteps, ContactSettings, depth_on_springs, press_columns
+from softtact.compiled import compiled
+from softtact.contact.node_grid import apply_stencil
+from softtact.contact.undersides import PosedUnderside
+from softtact.contact.unilateral import LEAST_REACH_MM, REACH, ContactLoadSteps
 from softtact.models.elastic.compliance import Compliance, LayerPress
+from softtact.models.quarter_symmetry import PARITIES
 
-COLUMNS_AT_ONCE = 4000      # 1 MB each on the coro's grid, most of it in single precision
-
-
-class DeviceSurface:
-    """A `Compliance` on a torch device: `double`, `single`, `precondition`, of values (nodes, columns) at all its grid's nodes."""
-
-    def __init__(self, compliance: Compliance, device: str | torch.device) -> None:
-        self.device, self.shape = torch.device(device), compliance.grid.shape
-        self._single = torch.as_tensor(compliance.blocks.blocks, dtype=torch.float32, device=self.device)
-        self._double = self._single.double()
-        self._offsets = list(_offsets(compliance.stencil))
-        self._weights = torch.as_tensor(_stencil_weights(compliance), dtype=torch.float32, device=self.device)
-
-    def double(self, force: torch.Tensor) -> torch.Tensor:
-        """Displacements in mm of forces in N, in double precision."""
-        return self._displacement(self._double, force)
-
-    def single(self, force: torch.Tensor) -> torch.Tensor:
-        """The same in single precision."""
-        return self._displacement(self._single, force)
-
-    def _displacement(self, blocks, force):
-        rows, columns = self.shape
-        even_y, odd_y = _folded(force.reshape(rows, columns, -1), axis=0)
-        parts = torch.stack([part for y in zip(_folded(even_y, axis=1), _folded(odd_y, axis=1), strict=True) for part in y])
-        moved = torch.bmm(blocks, parts.reshape(4, blocks.shape[2], -1)).reshape(parts.shape)
-        even_y, odd_y = (_unfolded(moved[y], moved[2 + y], axis=1) for y in (0, 1))     # PARITIES' order: x outside, y inside
-        return 0.25 * _unfolded(even_y, odd_y, axis=0).reshape(rows * columns, -1)
-
-    def precondition(self, x: torch.Tensor) -> torch.Tensor:
-        """Approximate inverse of `single`: the compliance's stencil."""
-        rows, columns = self.shape
-        reach = max(offset for offset, _ in self._offsets)
-        around = torch.nn.functional.pad(x.reshape(rows, columns, -1), (0, 0, reach, reach, reach, reach))
-        out = torch.zeros_like(x).reshape(rows, columns, -1)
-        for weight, (dj, di) in zip(self._weights, self._offsets, strict=True):
-            out.addcmul_(weight[:, :, None], around[reach + dj:reach + dj + rows, reach + di:reach + di + columns])
-        return out.reshape(rows * columns, -1)
+_FALL = 0.1             # of a residual, before the active set is renewed
+_MOST_KEPT = 4          # surfaces of up to 60 MB
+_SUMMED = 128          # products that are summed up in single precision
+_ROUND = 8              # rows and columns by which rectangles grow, so that few are prepared
+_NEWTONS = 30           # steps to the depth on springs, a first guess
+_TINY = 1e-30           # in place of a zero that divides
 
 
-def _folded(values, *, axis):
-    """Sum and difference of the two halves of a side that is symmetric about its middle place, from there on."""
-    middle = values.shape[axis] // 2
-    upper, lower = values.narrow(axis, middle, middle + 1), values.narrow(axis, 0, middle + 1).flip(axis).clone()
-    lower.select(axis, 0).zero_()     # the middle place mirrors itself
-    return upper + lower, upper - lower
+@dataclass(frozen=True)
+class BatchSettings:
+    """tolerance_mm: largest gap under pressure, and largest overlap;  max_iterations: active sets;  inner_iterations: on each."""
+
+    tolerance_mm: float = 5e-7
+    max_iterations: int = 60
+    inner_iterations: int = 40
 
 
-def _unfolded(even, odd, *, axis):
-    """Values on the whole side from their even and odd parts."""
-    upper, lower = even + odd, (even - odd).flip(axis)
-    return torch.cat([lower.narrow(axis, 0, lower.shape[axis] - 1), upper], dim=axis)
+class BatchSurface:
+    """A `Compliance` on a device, among the nodes of a rectangle about the middle: `displacement` and `precondition`.
 
-
-def _offsets(stencil):
-    reach = stencil.values.shape[2] // 2
-    return ((dj, di) for dj in range(-reach, reach + 1) for di in range(-reach, reach + 1))
-
-
-def _stencil_weights(compliance):
-    """The stencil's weights (offsets, ny, nx): of each node's neighbours at each offset."""
-    (rows, columns), values = compliance.grid.shape, compliance.stencil.values
-    reach = values.shape[2] // 2
-    j, i = np.meshgrid((np.arange(rows) - rows // 2) % 2, (np.arange(columns) - columns // 2) % 2, indexing="ij")
-    return np.stack([values[j, i, dj + reach, di + reach] for dj, di in _offsets(compliance.stencil)])
-
-
-def press_layers(compliance: Compliance, heights: Sequence[np.ndarray] | np.ndarray, forces_n: Sequence[float] | np.ndarray, *,
-                 device: str | torch.device, settings: ContactSettings | None = None) -> Iterator[LayerPress]:
-    """Yield the `LayerPress` of each object with `heights` (p, n) in mm over the grid's nodes, in their order.
-
-    forces_n (l,): in N, rising;  device: of torch. A load step that does not settle is marked by the contact's `settled`.
+    Values (4 u, columns) are those of the u nodes of the rectangle's quarter, then of their mirror images along y, along x, and
+    both. Nodes on an axis are their own images; there the image's place is not `real`.
     """
-    surface = DeviceSurface(compliance, device)
-    at_once = max(1, COLUMNS_AT_ONCE // len(forces_n))
-    for start in range(0, len(heights), at_once):
-        yield from _press_some(compliance, surface, heights[start:start + at_once], np.asarray(forces_n, dtype=float),
-                               settings or ContactSettings())
+
+    def __init__(self, compliance: Compliance, device: Any, quarter: tuple[int, int]) -> None:
+        """device: `cpu` for NumPy's arrays, else a device of torch;  quarter: rows and columns of the rectangle's quarter"""
+        self.grid, (rows, columns) = compliance.grid, quarter
+        whole = tuple(count // 2 + 1 for count in self.grid.shape)
+        self._numbers = np.arange(whole[0] * whole[1]).reshape(whole)[:rows, :columns].ravel()
+        self._all_nodes, _ = _images(self.grid, *np.divmod(np.arange(whole[0] * whole[1]), whole[1]))
+        self.nodes, self.real = _images(self.grid, *np.divmod(self._numbers, whole[1]))
+        self._device = None if device == "cpu" else device
+        neighbours, weights = _neighbours(compliance, self.nodes, self.real)
+        self._neighbours, self._weights = self.put(neighbours), self.put(weights)
+        self._blocks = self.put(compliance.blocks.blocks)
+        self._inner = self._blocks if quarter == whole else self.put(
+            np.stack([block[np.ix_(self._numbers, self._numbers)] for block in compliance.blocks.blocks]))
+
+    def put(self, values: np.ndarray) -> Any:
+        """An array on the device."""
+        if self._device is None:
+            return values
+        import torch  # takes seconds
+
+        return torch.as_tensor(values, device=self._device)
+
+    def displacement(self, force: Any) -> Any:
+        """Displacements (4 u, m) in mm of forces (4 u, m) in N, both in single precision."""
+        by_parity = _by_parity(force)
+        return _by_parity(0.25 * array_namespace(force).matmul(self._inner, by_parity)).reshape(force.shape)
+
+    def whole_displacement(self, force: Any) -> Any:
+        """The same in double precision, within 1e-7 of the whole: of forces in single precision, summed up in parts."""
+        return self._summed(self._inner, _by_parity(force)).reshape(force.shape)
+
+    def fields(self, force: Any) -> np.ndarray:
+        """`whole_displacement` (m, n) at all the grid's nodes."""
+        xp, by_parity = array_namespace(force), _by_parity(force)
+        everywhere = xp.zeros((len(PARITIES), self._blocks.shape[2], force.shape[1]), dtype=force.dtype, device=device(force))
+        everywhere[:, self._numbers] = by_parity
+        moved = _on_host(self._summed(self._blocks, everywhere)).reshape(len(self._all_nodes), -1)
+        fields = np.empty((moved.shape[1], self.grid.count))
+        fields[:, self._all_nodes] = moved.T
+        return fields
+
+    @staticmethod
+    def _summed(blocks, by_parity):
+        """The product in double precision, from parts in single precision, whose sums are too short to round much."""
+        xp, total = array_namespace(by_parity), 0.0
+        for first in range(0, blocks.shape[2], _SUMMED):
+            part = slice(first, first + _SUMMED)
+            total = total + xp.astype(xp.matmul(blocks[:, :, part], by_parity[:, part]), xp.float64)
+        return _by_parity(0.25 * total)
+
+    def at_nodes(self, values: Any) -> np.ndarray:
+        """Values (m, n) at the grid's nodes of values (4 u, m); zero beyond the rectangle."""
+        found = np.zeros((values.shape[1], self.grid.count))
+        found[:, self.nodes[self.real]] = _on_host(values)[self.real].T
+        return found
+
+    def precondition(self, x: Any) -> Any:
+        """Approximate inverse of `displacement`: the compliance's stencil."""
+        if self._device is None:
+            return apply_stencil(x, self._neighbours, self._weights)
+        out = self._weights[:, :1] * x[self._neighbours[:, 0]]
+        for number in range(1, self._neighbours.shape[1]):
+            out.addcmul_(self._weights[:, number, None], x[self._neighbours[:, number]])
+        return out
 
 
-def _press_some(compliance, surface, heights, forces_n, settings):
-    grid = compliance.grid
-    area = grid.areas(np.arange(grid.count))
-    first = np.stack([_depth_at_first(height, area, forces_n / compliance.foundation_modulus) for height in heights])
-    on_device = [torch.as_tensor(values, device=surface.device)
-                 for values in (np.stack(heights, axis=1), np.tile(forces_n, (len(heights), 1)), first)]
-    areas = torch.as_tensor(area, dtype=torch.float64, device=surface.device)
-    load_steps = press_columns(surface, *on_device, area=areas, settings=settings)
-    moved = surface.double(load_steps.force).reshape(*surface.shape, -1)
-    deformation = grid.with_held_sides(moved.permute(2, 0, 1).cpu().numpy())
-    arrays = {field.name: getattr(load_steps, field.name).cpu().numpy() for field in fields(load_steps)}
-    for press in range(len(heights)):
-        own = slice(press * len(forces_n), (press + 1) * len(forces_n))
-        contact = ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()})
-        yield LayerPress(fields=deformation[own], areas=area, contact=contact)
+def _by_parity(values):
+    """Sums over the four images (4 u, m) with the signs of each parity, (4, u, m); from parities to images it is the same."""
+    of, xp = values.reshape(len(PARITIES), -1, values.shape[-1]), array_namespace(values)
+    here, beyond = (of[0] + of[1], of[0] - of[1]), (of[2] + of[3], of[2] - of[3])
+    return xp.stack([here[0] + beyond[0], here[1] + beyond[1], here[0] - beyond[0], here[1] - beyond[1]])
 
 
-def _depth_at_first(height, area, force_over_modulus):
-    lowest, there = height.min(), height < NO_CONTACT_MM
-    return lowest + depth_on_springs(height[there] - lowest, area[there], force_over_modulus)
+def _images(grid, rows, columns):
+    """Numbers (4 u,) in the grid of a quarter's nodes, counted from the middle, and of their images; which (4 u,) are real."""
+    middle_j, middle_i = (count // 2 for count in grid.shape)
+    signs = [(1 - 2 * x, 1 - 2 * y) for x, y in PARITIES]
+    nodes = [(middle_j + y * rows) * grid.shape[1] + middle_i + x * columns for x, y in signs]
+    real = [((x > 0) | (columns > 0)) & ((y > 0) | (rows > 0)) for x, y in signs]
+    return np.concatenate(nodes), np.concatenate(real)
+
+
+def _neighbours(compliance, nodes, real):
+    """Places (4 u, k) of the neighbours of each real place, and the stencil's weights, 0 where there is none."""
+    places = np.flatnonzero(real)
+    found, weight = compliance.stencil.around(compliance.grid, nodes[real])
+    neighbours, weights = np.zeros((len(nodes), found.shape[1]), dtype=np.int64), np.zeros((len(nodes), found.shape[1]), np.float32)
+    neighbours[places], weights[places] = np.where(found >= 0, places[found], 0), np.where(found >= 0, weight, 0.0)
+    return neighbours, weights
+
+
+_KEPT: "OrderedDict[tuple, tuple[weakref.ref, BatchSurface]]" = OrderedDict()     # the last few, by their compliance's identity
+
+
+def _surface_of(compliance, device, quarter):
+    """The `BatchSurface`, made once for as long as its compliance is in use."""
+    key = id(compliance), str(device), quarter
+    if key not in _KEPT or _KEPT[key][0]() is not compliance:
+        _KEPT[key] = weakref.ref(compliance), BatchSurface(compliance, device, quarter)
+        while len(_KEPT) > _MOST_KEPT:
+            _KEPT.popitem(last=False)
+    return _KEPT[key][1]
+
+
+def _on_host(values):
+    return values if isinstance(values, np.ndarray) else values.cpu().numpy()
+
+
+def press_layers(compliance: Compliance, objects: list[PosedUnderside], forces_n: np.ndarray, *, device: Any = "cpu",
+                 settings: BatchSettings = BatchSettings()) -> LayerPress:
+    """The `LayerPress` of objects through forces (p, l) in N, rising, whose columns are the objects' load steps, side by side.
+
+    device: `cpu`, or a device of torch. A load step that does not settle is marked by the contact's `settled`.
+    """
+    load_steps = forces_n.shape[1]
+    heights = np.repeat([one.height_mm for one in objects], load_steps, axis=0)
+    stops = np.repeat([one.stop_mm for one in objects], load_steps)
+    return _press_columns(compliance, heights, forces_n.ravel(), stops, device, settings)
+
+
+def _press_columns(compliance, heights, forces_n, stops, device, settings):
+    """The `LayerPress` of columns (m,) with heights (m, n): first among the nodes that the objects are expected to come near."""
+    grid, area = compliance.grid, compliance.grid.areas(np.arange(compliance.grid.count))
+    lowest = heights.min(axis=1)
+    first = _depths_on_springs(heights, area, forces_n / compliance.foundation_modulus)
+    near = (heights < (lowest + REACH * (first - lowest) + LEAST_REACH_MM)[:, None]).any(axis=0)
+    away = np.abs(grid.from_middle(np.flatnonzero(near))).max(axis=0) + 1
+    whole = tuple(count // 2 + 1 for count in grid.shape)
+    quarter = tuple(min(_ROUND * -(-int(wanted) // _ROUND), most) for wanted, most in zip(away[::-1], whole, strict=True))
+    found = _among(compliance, quarter, heights, forces_n, stops, first, device, settings)
+    deeper = (found["gap"] < -settings.tolerance_mm).any(axis=1) & found["settled"]      # than expected: others touch, too
+    if deeper.any():
+        again = _among(compliance, whole, heights[deeper], forces_n[deeper], stops[deeper], first[deeper], device, settings)
+        for name, values in again.items():
+            found[name][deeper] = values
+    fields = grid.with_held_sides(found.pop("fields").reshape(-1, *grid.shape))
+    found |= {"force": found["force"].T, "gap": found["gap"].T}
+    return LayerPress(fields=fields, contact=ContactLoadSteps(**found), areas=area)
+
+
+def _among(compliance, quarter, heights, forces_n, stops, first, device, settings):
+    """Arrays by their names in `ContactLoadSteps`, columns first, and `fields`, with contact within a rectangle's quarter alone."""
+    surface = _surface_of(compliance, device, quarter)
+    areas = compliance.grid.areas(surface.nodes) * surface.real
+    gap0 = np.where(surface.real[:, None], heights.T[surface.nodes], 2 * heights.max())
+    press = _Columns(surface, surface.put(gap0), surface.put(forces_n), settings)
+    xp = press.xp
+    press.start(surface.put(first), surface.put(areas))
+    press.settle(xp.arange(len(forces_n)) if device == "cpu" else surface.put(np.arange(len(forces_n))))
+    resting = (_on_host(press.depth) > stops) | (~_on_host(press.settled) & np.isfinite(stops))
+    if resting.any():
+        press.hold(surface.put(np.flatnonzero(resting)), surface.put(stops[resting]))
+    force, depth = xp.astype(press.force, xp.float32), _on_host(press.depth)
+    fields = surface.fields(force)
+    return {"force": surface.at_nodes(press.force), "depth": depth, "gap": heights - depth[:, None] + fields, "fields": fields,
+            "iterations": _on_host(press.iterations), "settled": _on_host(press.settled)}
+
+
+class _Columns:
+    """The state of all columns (m,): forces (n, m) in N and their displacement, depths, the active set, and which have settled."""
+
+    def __init__(self, surface, gap0, forces, settings):
+        self.surface, self.gap0, self.forces, self.settings = surface, gap0, forces, settings
+        self.xp = xp = array_namespace(gap0)
+        self.held, self.settled = xp.zeros_like(forces, dtype=xp.bool), xp.zeros_like(forces, dtype=xp.bool)
+        self.iterations = xp.zeros_like(forces, dtype=xp.int64)
+
+    def start(self, depth, area):
+        """First guess: forces of independent springs under the object, at the depth that balances each force."""
+        xp = self.xp
+        pressed = xp.clip(depth - self.gap0, min=0.0) * area[:, None]
+        self.force, self.depth = pressed * (self.forces / xp.sum(pressed, axis=0)), depth
+        self.active = self.force > 0
+        self.moved = self.surface.whole_displacement(xp.astype(self.force, xp.float32))
+
+    def hold(self, columns, depth):
+        """Settle columns again, held at a depth in place of their force."""
+        self.held[columns], self.depth[columns] = True, depth
+        self.settle(columns)
+
+    def settle(self, columns):
+        """Iterate on some columns until each has settled, or up to the limit."""
+        for _ in range(self.settings.max_iterations):
+            gap, active, self.settled[columns] = self._evaluate(columns)
+            left = ~self.settled[columns]
+            if not self.xp.any(left):
+                return
+            columns = columns[left]
+            self._advance(columns, gap[:, left], active[:, left])
+
+    def _evaluate(self, columns):
+        """Gaps and the next active set of some columns, and which of these have settled."""
+        xp, tolerance = self.xp, self.settings.tolerance_mm
+        force, active, held = self.force[:, columns], self.active[:, columns], self.held[columns]
+        gap = self.gap0[:, columns] + self.moved[:, columns]
+        count = xp.clip(xp.sum(xp.astype(active, gap.dtype), axis=0), min=1.0)
+        depth = xp.where(held, self.depth[columns], xp.sum(gap * active, axis=0) / count)
+        gap -= depth
+        joining, pulling = ~active & (gap < -tolerance), active & (force < 0)
+        self.depth[columns] = depth
+        unsettled = xp.any((xp.abs(gap) > tolerance) & active | joining | pulling, axis=0)
+        return gap, (active | joining) & ~pulling, ~unsettled
+
+    def _advance(self, columns, gap, active):
+        """Forces of some columns on their next active set; points that left it lose theirs."""
+        xp, surface = self.xp, self.surface
+        before = self.force[:, columns]
+        kept, mask = before * active, xp.astype(active, xp.float32)
+        free = xp.astype(~self.held[columns], xp.float32)
+        lacking = free * xp.astype(self.forces[columns] - xp.sum(kept, axis=0), xp.float32)
+        even = surface.precondition(mask) * mask
+        weight = xp.clip(xp.sum(even, axis=0), min=_TINY)
+        change = xp.astype(kept - before, xp.float32) + even * (lacking / weight)
+        moved = surface.displacement(change)
+        right = (xp.astype(-gap, xp.float32) - moved) * mask
+        self._conjugate_gradients(change, moved, right, mask, even * (free / weight), free)
+        self.force[:, columns] = (before + change) * active     # no rounded rest where nothing touches
+        self.moved[:, columns] = self.moved[:, columns] + moved
+        self.active[:, columns] = active
+        self.iterations[columns] += 1
+
+    def _conjugate_gradients(self, change, moved, residual, mask, even, free):
+        """Add to `change` and `moved` until the residual has fallen; the sum of forces is kept where a column is free."""
+        xp, surface = self.xp, self.surface
+        share = free / xp.clip(xp.sum(mask, axis=0), min=1.0)
+
+        def centred(r):
+            return r - mask * (share * xp.sum(r, axis=0))
+
+        def project(r):
+            z = surface.precondition(r)
+            z *= mask
+            z -= even * xp.sum(z, axis=0)
+            return z
+
+        residual = centred(residual)
+        least = xp.clip(_FALL * xp.max(xp.abs(residual), axis=0), min=0.3 * self.settings.tolerance_mm)
+        z = project(residual)
+        direction, rho = xp.asarray(z, copy=True), xp.sum(residual * z, axis=0)
+        for _ in range(self.settings.inner_iterations):
+            going = xp.max(xp.abs(residual), axis=0) > least
+            if not xp.any(going):
+                break
+            by_direction = surface.displacement(direction)
+            length = xp.sum(direction * by_direction, axis=0)
+            step = xp.where(going, rho / xp.clip(length, min=_TINY), 0.0)
+            change += step * direction
+            by_direction *= step
+            moved += by_direction
+            by_direction *= mask
+            before, residual = residual, centred(residual - by_direction)
+            z = project(residual)
+            turned = xp.clip(xp.sum((residual - before) * z, axis=0), min=0.0)     # Polak and Ribiere's: single precision
+            direction *= xp.where(rho > 0, turned / xp.clip(rho, min=_TINY), 0.0)
+            direction += z
+            rho = xp.sum(residual * z, axis=0)
+
+
+@compiled
+def _depths_on_springs(heights, area, force_over_modulus):
+    """Depths (m,) in mm at which independent springs under heights (m, n) carry forces: Newton's method from one side."""
+    depths = np.empty(len(heights))
+    for m in range(len(heights)):
+        depth = heights[m].min()
+        for _ in range(_NEWTONS):
+            carried, carrying = 0.0, 0.0
+            for n in range(len(area)):
+                if heights[m, n] <= depth:
+                    carried += area[n] * (depth - heights[m, n])
+                    carrying += area[n]
+            step = (force_over_modulus[m] - carried) / carrying
+            depth += step
+            if abs(step) < 1e-3:
+                break
+        depths[m] = depth
+    return depths

@@ -6,7 +6,7 @@ The vertical compliance of the top's nodes (mm/N) is computed once for a sensor 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -232,6 +232,12 @@ class LayerPress:
     def thinning(self) -> np.ndarray:
         """By how much the layer is thinner at its nodes, (l, 2 ny - 1, 2 nx - 1) in mm."""
         return self.fields if self.lower_fields is None else self.fields - self.lower_fields
+
+    def columns(self, some: np.ndarray) -> "LayerPress":
+        """The press of some of its load steps."""
+        contact = ContactLoadSteps(**{one.name: getattr(self.contact, one.name)[..., some] for one in fields(self.contact)})
+        return LayerPress(self.fields[some], contact, self.areas,
+                          None if self.lower_fields is None else self.lower_fields[some])
 
 
 def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence[float] | np.ndarray, *,

@@ -1,0 +1,231 @@
+"""Presses of many poses as the arrays of one batch: `press_batch`, and the results of `Sensor.press_many` with the elastic model.
+
+The elastic model presses all of them together, on the processor or on a GPU: undersides, contact, shell, maps, readings, flags and
+expected errors are arrays with a row for each press, and no press is made alone. The foundation model presses them one after the
+other, and so does the elastic model on sensors that its batch does not serve (`together`).
+"""
+
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softtact.contact.undersides import ObjectSurface, PosedUnderside, Target
+from softtact.contact.unilateral import not_settled
+from softtact.devices import find_device
+from softtact.errors import ConvergenceError, InputError, ShellWarning, SofttactError
+from softtact.geometry.pose import Pose
+from softtact.models.elastic.batch import press_layers
+from softtact.models.elastic.compliance import Compliance
+from softtact.press.choice import with_expected_error
+from softtact.press.fast import elastic_result
+from softtact.press.making import RESTS, shell_of
+from softtact.press.result import PressResult
+from softtact.press.task import checked_forces, cores
+from softtact.press.validity import flag_buried
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
+
+_AT_ONCE = {"cpu": 64, "cuda": 4096}     # presses of one problem
+
+# The arrays of a `PressBatch`, which are those of a `PressResult` with a press in place of a load step.
+_OF_RESULT = ("deformation_map_mm", "thinning_map_mm", "normal_force_n", "pad_force_n", "indentation_mm", "contact_area_mm2",
+              "penetration_mm", "expected_error_mm", "converged", "within_validity", "validity_reason")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressBatch:
+    """Presses n of one force each. The rows of presses that failed hold zeros, and `validity_reason` says why."""
+
+    deformation_map_mm: np.ndarray
+    """(n, ny, nx) in mm: how far the sensing surface moved towards the board."""
+    thinning_map_mm: np.ndarray
+    """(n, ny, nx) in mm: how much thinner the layer is, as its taxels read it."""
+    tactile_map: np.ndarray | None
+    """(n, row, column) in counts, without noise; None where the sensor has no taxels."""
+    normal_force_n: np.ndarray
+    """(n,) in N: how hard each object was pressed, pad and shell together."""
+    pad_force_n: np.ndarray
+    """(n,) in N: the part that the pad carries; less where the object rests on the shell beside it."""
+    indentation_mm: np.ndarray
+    """(n,) in mm: descent of each object from first touch."""
+    contact_area_mm2: np.ndarray
+    """(n,) in mm2: area under pressure."""
+    penetration_mm: np.ndarray
+    """(n,) in mm: deepest overlap that the solver left."""
+    expected_error_mm: np.ndarray
+    """(n,) in mm: expected root mean square error of the map against the hyperelastic model; nan where it is not known."""
+    converged: np.ndarray
+    """(n,) bool: which presses have a result."""
+    within_validity: np.ndarray
+    """(n,) bool: whose numbers can be relied on."""
+    validity_reason: np.ndarray
+    """(n,) texts: why not, several reasons joined by "; ", or the sentence of the error; empty where valid."""
+    errors: Mapping[int, SofttactError]
+    """By the number of each press that failed; the others are not affected."""
+
+
+def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurface], poses: np.ndarray | Sequence[Any],
+                force_n: np.ndarray | float, *, model: str = "elastic", device: str = "auto") -> PressBatch:
+    """Press objects in poses (n, 6), each by one force; return the arrays of a `PressBatch`.
+
+    surfaces: one object for all poses, or n of them;  poses: x, y, z in mm and rx, ry, rz in degrees, as `Pose.of` takes them
+    force_n: one for all, or (n,), in N;  model: elastic or foundation;  device: cpu, cuda, or auto: a GPU where there is one
+    An object that misses the sensor, a pose that is no pose, or a press that does not settle is an error in its place. One warning
+    at most, with a count, says that objects rest on the shell. Raises InputError for other faults, such as a force out of range.
+    """
+    every = [surfaces] * len(poses) if isinstance(surfaces, ObjectSurface) else list(surfaces)
+    if len(every) != len(poses):
+        raise InputError(f"There are {len(every)} objects and {len(poses)} poses; give one object for each pose, or one object.")
+    forces = np.full(len(poses), force_n, dtype=float) if np.ndim(force_n) == 0 else np.asarray(force_n, dtype=float)
+    if forces.shape != (len(poses),):
+        raise InputError(f"There are {forces.size} forces and {len(poses)} poses; give one force for each pose, or one force.")
+    checked_forces(np.unique(forces).tolist(), sensor.spec.force_range_n, sensor.spec.name)
+    press: Callable[..., Iterator[Any]]
+    if model == "elastic" and together(sensor):
+        press = _pressed_together
+    elif model in ("elastic", "foundation"):
+        press = _pressed_in_turn
+    else:
+        raise InputError(f"model={model!r}: a batch is pressed by the elastic or the foundation model; use Sensor.press_many.")
+    batch = _Batch(sensor, len(poses))
+    for numbers, found in press(sensor, every, poses, forces[:, None], model=model, device=device):
+        batch.take(numbers, found)
+    warn_of_shells(sensor, batch.arrays["normal_force_n"], batch.arrays["pad_force_n"])
+    return batch.finished()
+
+
+def together(sensor: "Sensor") -> bool:
+    """Whether the elastic model presses a sensor's batch as one problem: its lower side is held, and all its readouts are ours,
+    which read each load step by itself.
+    """
+    spec = sensor.spec
+    if not (spec.has_layers and spec.base_held) or spec.edge.far:
+        return False
+    ours = all(type(readout).__module__.startswith("softtact.") for readout in sensor.readouts.values())
+    return ours and type(sensor.prepared("elastic")) is Compliance
+
+
+def press_together(sensor: "Sensor", surfaces: Sequence[ObjectSurface], poses: Sequence[Any], forces_n: np.ndarray, *,
+                   device: str = "cpu") -> list[Any]:
+    """The `PressResult` of each press through forces (l,) in N with the elastic model, or the error in its place."""
+    results: list[Any] = [None] * len(surfaces)
+    forces = np.tile(forces_n, (len(surfaces), 1))
+    for numbers, found in _pressed_together(sensor, surfaces, poses, forces, device=device):
+        for place, number in enumerate(numbers):
+            results[number] = (found if isinstance(found, SofttactError)
+                               else _part(found, slice(place * len(forces_n), (place + 1) * len(forces_n))))
+    return results
+
+
+def warn_of_shells(sensor: "Sensor", forces_n: np.ndarray, on_pad_n: np.ndarray) -> None:
+    """One warning that counts the presses (n,) that rest on the shell, if any."""
+    resting = int((forces_n - on_pad_n > RESTS * forces_n).sum())
+    if resting:
+        warnings.warn(f"In {resting} of {len(forces_n)} presses the object rests on the shell beside the pad, which carries a part "
+                      f"of the force (`pad_force_n` is what the pad carries; {sensor.spec.edge.in_words}); if your sensor's shell "
+                      "ends lower, state 'edge' in its file.", ShellWarning, stacklevel=3)
+
+
+class _Batch:
+    """The arrays of a batch while its presses end."""
+
+    def __init__(self, sensor, count):
+        self.count, self.errors, shape = count, {}, (count, *sensor.spec.map_shape)
+        self.arrays = {name: np.zeros(shape if name.endswith("map_mm") else count) for name in _OF_RESULT}
+        self.arrays["validity_reason"], self.arrays["expected_error_mm"] = np.full(count, "", dtype=object), np.full(count, np.nan)
+        taxels = sensor.spec.taxels if "taxels" in sensor.readouts else None
+        self.counts = None if taxels is None else np.zeros((count, taxels.rows, taxels.columns))
+
+    def take(self, numbers, found):
+        """Keep the result of the presses `numbers`, whose load steps they are, or the error of one of them."""
+        if isinstance(found, SofttactError):
+            self.errors[int(numbers[0])] = found
+            self.arrays["validity_reason"][numbers] = str(found)
+            return
+        for name, array in self.arrays.items():
+            array[numbers] = getattr(found, name)
+        if self.counts is not None:
+            self.counts[numbers] = found.tactile_map
+
+    def finished(self):
+        flags = {name: self.arrays[name] > 0 for name in ("converged", "within_validity")}
+        reasons = np.array(self.arrays["validity_reason"].tolist(), dtype=str)
+        return PressBatch(**self.arrays | flags | {"validity_reason": reasons}, tactile_map=self.counts, errors=self.errors)
+
+
+def _pressed_in_turn(sensor, surfaces, poses, forces_n, *, model, device):
+    """([number], its result or error) of each press."""
+    if model != "elastic" and device not in ("cpu", "auto"):
+        raise InputError(f"device={device!r}: only the elastic model presses on a GPU; leave it out for the model {model!r}.")
+    for number, (surface, pose, force) in enumerate(zip(surfaces, poses, forces_n, strict=True)):
+        with warnings.catch_warnings():      # the batch counts them
+            warnings.simplefilter("ignore", ShellWarning)
+            try:
+                found: Any = sensor.press(surface.mesh, pose=pose, force_n=force, model=model, threads=1, label="")
+            except (ConvergenceError, InputError) as error:
+                found = error.with_traceback(None)
+        yield [number], found
+
+
+def _pressed_together(sensor, surfaces, poses, forces_n, *, device, model="elastic"):
+    """(numbers of presses, their result, with all their load steps in turn) or ([number], its error), in parts."""
+    device = find_device(device)
+    compliance, spec = sensor.prepared("elastic"), sensor.spec
+    target = Target(compliance.grid, spec.map_x_mm, spec.map_y_mm, spec.footprint_mm, shell_of(sensor), spec.thickness_mm)
+    at_once = max(1, _AT_ONCE["cpu" if device == "cpu" else "cuda"] // forces_n.shape[1])
+    for first in range(0, len(surfaces), at_once):
+        start, some = time.perf_counter(), range(first, min(first + at_once, len(surfaces)))
+        undersides = _undersides(surfaces, poses, some, target, threads=1 if device == "cpu" else cores())
+        yield from (([number], one) for number, one in zip(some, undersides, strict=True) if isinstance(one, InputError))
+        good = [number for number, one in zip(some, undersides, strict=True) if isinstance(one, PosedUnderside)]
+        if good:
+            objects = [one for one in undersides if isinstance(one, PosedUnderside)]
+            yield from _read(sensor, compliance, good, objects, forces_n[good], device, start)
+
+
+def _undersides(surfaces, poses, some, target, *, threads):
+    """The underside of each of some presses, or its error; threads serve, as the compiled function runs without Python's lock."""
+    def of(number):
+        try:
+            return surfaces[number].over(target, Pose.of(poses[number]))
+        except InputError as error:
+            return error.with_traceback(None)
+
+    if threads == 1:
+        return [of(number) for number in some]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(of, some))
+
+
+def _read(sensor, compliance, numbers, objects, forces_n, device, start):
+    """(numbers, their result), and the errors of those that did not settle, of presses through forces (p, l)."""
+    load_steps = forces_n.shape[1]
+    press = press_layers(compliance, objects, forces_n, device=device)
+    settled = press.contact.settled.reshape(-1, load_steps)
+    for number, steps, forces in zip(numbers, settled, forces_n, strict=True):
+        if not steps.all():
+            yield [number], ConvergenceError(not_settled(forces[~steps][0]))
+    good = np.flatnonzero(settled.all(axis=1))
+    if not len(good):
+        return
+    columns = (good[:, None] * load_steps + np.arange(load_steps)).ravel()
+    touch, top = (np.repeat([getattr(objects[k], name) for k in good], load_steps) for name in ("touch_mm", "top_mm"))
+    seconds = np.full(len(columns), (time.perf_counter() - start) / len(columns))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShellWarning)
+        result = elastic_result(sensor, press.columns(columns), forces_n[good].ravel(), seconds, touch_mm=touch)
+    yield [numbers[k] for k in good], with_expected_error(sensor, flag_buried(result, top))
+
+
+def _part(result: PressResult, steps: slice) -> PressResult:
+    """A result of some of its load steps."""
+    arrays = {one.name: getattr(result, one.name)[steps] for one in fields(result)
+              if one.metadata.get("dimensions", ())[:1] == ("step",) and getattr(result, one.name) is not None}
+    readings = {name: values.isel(step=steps) for name, values in result.readings.items()}
+    return replace(result, **arrays, readings=readings, wall_time_s=result.wall_time_s[steps])
