@@ -40,7 +40,9 @@ def plan(sensor, meshes, **changes):
 @pytest.fixture(scope="module")
 def whole(sensor, meshes, tmp_path_factory):
     path = tmp_path_factory.mktemp("data") / "whole.h5"
-    assert write_press_data(path, plan(sensor, meshes), workers=1, label="") == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(press_blocks, "BLOCK", 2)     # presses of one block are solved together, and round together
+        assert write_press_data(path, plan(sensor, meshes), workers=1, label="") == 0
     return path
 
 
@@ -53,8 +55,8 @@ def test_a_sample_is_the_press_that_its_pose_and_force_name(whole, sensor, meshe
     found = arrays(whole)
     assert found["deformation_map_mm"].shape == (4, 2, 1, 57, 33) and found["object"].tolist() == [0, 1, 0, 1]
     again = sensor.press(meshes["disc"], pose=Pose.from_values(found["pose"][3]), force_n=[5.0, 20.0], model="elastic", threads=1)
-    assert np.allclose(found["deformation_map_mm"][3, :, 0], again.deformation_map_mm, rtol=0, atol=1e-7)     # single precision
-    assert np.array_equal(found["tactile_map"][3, :, 0], np.round(again.tactile_map))
+    assert np.allclose(found["deformation_map_mm"][3, :, 0], again.deformation_map_mm, rtol=0, atol=2e-6)     # mm
+    assert np.abs(found["tactile_map"][3, :, 0] - again.tactile_map).max() < 0.51      # whole counts
 
 
 # --- data sets that are interrupted, and faults of the disk ---

@@ -23,7 +23,7 @@ from softtact.progress import progress
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_PART = 64     # presses of one problem in a process
+_COLUMNS = 32     # load steps of one problem in a process; a fixed number, so that results do not depend on the processes
 _PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": ("foundation",)}
 
 
@@ -86,7 +86,7 @@ def _pressed_together(sensor, jobs, batch, *, device):
             surfaces[id(mesh)] = ObjectSurface(mesh)
     pairs = [(surfaces[id(mesh)], pose) for mesh, pose in jobs]
     workers = batch.workers if device == "cpu" else 1
-    size = min(_PART, -(-len(pairs) // workers)) if device == "cpu" else len(pairs)
+    size = max(1, _COLUMNS // len(batch.force_n)) if device == "cpu" else len(pairs)
     parts = [pairs[first:first + size] for first in range(0, len(pairs), size)]
     act = partial(_part_pressed, force_n=batch.force_n, device=device)
     results: list[Any] = []
