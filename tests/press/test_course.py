@@ -199,5 +199,5 @@ def test_many_presses_take_matrices_as_single_ones_do(sensor):
     matrix[:3, 3] = [0.3, 0.2, 3.0]
     one, = sensor.press_many(BALL, [matrix], force_n=0.5, model="elastic", workers=1, device="cpu")
     single = sensor.press(BALL, pose=matrix, force_n=0.5, model="elastic", label="")
-    np.testing.assert_allclose(one.deformation_map_mm, single.deformation_map_mm, rtol=0, atol=2e-6)     # mm, the solvers' tolerance
+    np.testing.assert_allclose(one.deformation_map_mm, single.deformation_map_mm, rtol=0, atol=2e-6)     # mm
     assert one.expected_error_mm[0] == pytest.approx(single.expected_error_mm[0], abs=2e-6) and one.expected_error_mm[0] > 0
