@@ -9,7 +9,7 @@ from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
 from softtact.fem import elements
 from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET4, TET10, TRI3, TRI6, WEDGE18, Element, reference_gradients
-from softtact.fem.quadrature import gauss
+from softtact.fem.quadrature import gauss, lobatto_rule
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 
@@ -85,6 +85,14 @@ def test_quadrature_integrates_all_polynomials_of_its_degree(element):
                 assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(element, powers), abs=1e-14)
         over = (2 * ((rule.degree + 2) // 2), *[0] * (dimension - 1))     # even: odd powers vanish on [-1, 1] for every rule
         assert rule.weights @ np.prod(rule.points**over, axis=1) != pytest.approx(integral(element, over), abs=1e-6), reduced
+
+
+def test_lobattos_rule_has_the_corners_and_integrates_polynomials_of_the_third_degree_alone():
+    rule = lobatto_rule(3)
+    assert {tuple(node) for node in HEX20.nodes} <= {tuple(point) for point in rule.points} and len(rule.points) == 27
+    for powers in product(range(4), repeat=3):
+        assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(HEX20, powers), abs=1e-14)
+    assert rule.weights @ rule.points[:, 0]**4 != pytest.approx(integral(HEX20, (4, 0, 0)), abs=1e-6)
 
 
 def test_the_wedges_quadrature_integrates_the_square_of_its_quadratic_functions():

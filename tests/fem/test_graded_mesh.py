@@ -64,9 +64,10 @@ def test_a_corner_that_is_pushed_through_its_element_shows_in_the_least_volume_r
     assert mesh.least_volume_ratio(lowered) == pytest.approx(1 - 3 * 0.45, rel=1e-12)
 
 
+@pytest.mark.parametrize("resists", [False, True])
 @pytest.mark.parametrize("caps", [(0, 1, 2), (1, 0, 2)])
-def test_a_split_slab_passes_the_patch_test(caps):
-    """A linear displacement: no force on nodes inside, to round-off."""
+def test_a_split_slab_passes_the_patch_test(caps, resists):
+    """A linear displacement: no force on nodes inside, to round-off, whether its cover resists folding or not."""
     none = np.zeros((0, 4), dtype=int)
     grid = grid_mesh_2d(np.linspace(-3, 3, 17), np.linspace(-2, 2, 9))   # each element under one of the cover
     mesh_2d = SheetMesh2D(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
@@ -75,6 +76,7 @@ def test_a_split_slab_passes_the_patch_test(caps):
     depth = split_depths((4, 4), lambda low, size, depth: rng.random(len(low)) < 0.4, 2)
     slab = Slab(Layer(np.array([-2.0, -1.5]), LAW), Layer(np.array(HEIGHTS), LAW),
                 SlabMesh(mesh_2d, x, y, np.stack([np.minimum(depth, cap) for cap in caps])), sides="held", contact=Contact())
+    slab.resist_folding(resists)
     gradient = np.array([[0.1, 0.05, 0.0], [-0.02, -0.08, 0.03], [0.04, 0.0, -0.1]])
     displacement = slab.points @ gradient.T
     planes = slab.project(displacement, lambda x, y: (np.full(len(x), 1e3), np.tile([0.0, 0.0, -1.0], (len(x), 1))))

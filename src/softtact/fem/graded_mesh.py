@@ -12,9 +12,10 @@ import scipy.sparse as sp
 
 from softtact.fem.elements import HEX20
 from softtact.fem.extruded_mesh import grid_mesh_2d
+from softtact.fem.quadrature import gauss_rule, lobatto_rule
 
-# Derivatives of the shape functions at the points of both rules and at the corners.
-_SLOPES = HEX20.shape(np.vstack([HEX20.reduced.points, HEX20.quadrature.points, HEX20.nodes[:HEX20.corners]]))[1]  # type: ignore[union-attr]
+# Derivatives of the shape functions where elements may be folded: points of the rules, and corners and middles of their sides.
+_SLOPES = HEX20.shape(np.vstack([rule.points for rule in (gauss_rule(2, 3), gauss_rule(3, 3), lobatto_rule(3))]))[1]
 _ROUNDS = 20   # masters of hanging nodes may hang themselves; each round resolves one level
 
 

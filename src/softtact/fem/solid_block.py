@@ -241,13 +241,13 @@ def _distinct(numbers):
 
 
 class _ElementBlock(SolidBlock):
-    """Elements of a kind at coordinates (e, m, 3) in mm, with full or reduced quadrature.
+    """Elements of a kind at coordinates (e, m, 3) in mm, with full or reduced quadrature, or with another rule.
 
     trilinear: the volume change is projected on trilinear instead of linear functions
     """
 
-    def __init__(self, element, coordinates, law, *, reduced=False, trilinear=False, **options):
-        rule, (first, shapes) = element.reduced if reduced else element.quadrature, _unlike(coordinates)
+    def __init__(self, element, coordinates, law, *, reduced=False, rule=None, trilinear=False, **options):
+        rule, (first, shapes) = rule or (element.reduced if reduced else element.quadrature), _unlike(coordinates)
         gradients, volumes = reference_gradients(coordinates[first], element.shape(rule.points)[1], rule.weights)
         super().__init__(gradients, volumes, pressure_modes(rule.points, trilinear), law, shapes=shapes, **options)
 
@@ -255,7 +255,7 @@ class _ElementBlock(SolidBlock):
 class HexBlock(_ElementBlock):
     """Hexahedra HEX20 or HEX27 given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them.
 
-    reduced: 2 x 2 x 2 points instead of 3 x 3 x 3;  trilinear: functions of the pressure
+    reduced: 2 x 2 x 2 points instead of 3 x 3 x 3;  rule: another `Quadrature`;  trilinear: functions of the pressure
     """
 
     def __init__(self, coordinates: np.ndarray, law: Law, **options: Any) -> None:

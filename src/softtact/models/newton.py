@@ -55,6 +55,8 @@ class Solution:
     """Steps that were taken."""
     residual_n: float
     """The last largest unbalanced force in N."""
+    last: Any
+    """The last state, at equilibrium or not."""
 
 
 def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0) -> Solution:
@@ -67,17 +69,17 @@ def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float 
         state = problem.prepared(state, iteration)
         residual = problem.residual(state)
         if problem.balanced(state, residual):
-            return Solution(state, iteration, residual)
+            return Solution(state, iteration, residual, state)
         if iteration == max_iterations and residual > nearly_n:
-            return Solution(None, iteration, residual)
+            return Solution(None, iteration, residual, state)
         state, step = problem.step(state)
         trial = None if step is None else line_search(problem, state, step, residual)
         if trial is not None:
             problem.accepted(state, trial)
             state = trial
         elif not problem.recovered(state):
-            return Solution(None, iteration, residual)
-    return Solution(None, 2 * max_iterations, residual)
+            return Solution(None, iteration, residual, state)
+    return Solution(None, 2 * max_iterations, residual, state)
 
 
 def line_search(problem: Problem, state: Any, step: Any, residual: float) -> Any:

@@ -165,13 +165,13 @@ class Overlapping:
 def test_overlaps_are_augmented_as_long_as_it_helps(monkeypatch, overlaps, spent, passes):
     body = Overlapping([1e-3 * depth for depth in overlaps], spent)
     monkeypatch.setattr("softtact.models.hyperelastic.newton.settle",
-                        lambda body, *_: Solution("state", body.spent[body.passes - 1], 0.0))
-    found = augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
+                        lambda body, *_: Solution("state", body.spent[body.passes - 1], 0.0, "state"))
+    found = augment(body, None, Solution("state", 0, 0.0, "state"), 1.0, NewtonSettings())
     assert (found.state, body.passes, found.iterations) == ("state", passes, sum(spent[:passes]))
 
 
 def test_three_times_the_overlap_is_left_where_points_have_run_under_an_edge(monkeypatch):
     body = Overlapping([5e-3, 2.9e-3, 0.5e-3], [1, 1], edged=True)
-    monkeypatch.setattr("softtact.models.hyperelastic.newton.settle", lambda body, *_: Solution("state", 1, 0.0))
-    augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
+    monkeypatch.setattr("softtact.models.hyperelastic.newton.settle", lambda body, *_: Solution("state", 1, 0.0, "state"))
+    augment(body, None, Solution("state", 0, 0.0, "state"), 1.0, NewtonSettings())
     assert body.passes == 1

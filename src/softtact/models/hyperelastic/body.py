@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.contact.friction import FrictionResponse, FrictionState
+from softtact.errors import ConvergenceError
 from softtact.fem import kernels
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.workers import SERIAL, Workers, chunks
@@ -189,10 +190,28 @@ class LayeredBody:
 
     def begin(self) -> None:
         """Discard all tangents and factors of an earlier press, since they would change the last digits of a result."""
+        self.slab.resist_folding(False)
         self.cells.reset()
+        self._forget_factors()
+        self.friction.reset()
+
+    def _forget_factors(self):
         self.stepper.reset()
         self._shift = None
-        self.friction.reset()
+
+    def folds(self, state: BodyState) -> bool:
+        """Whether an element of the cover is folded, and the cover does not yet resist that."""
+        return not self.slab.resists_folding and self.slab.cover_mesh.least_volume_ratio(state.slab.displacement) <= 0
+
+    def resisting_folding(self, state: BodyState) -> BodyState:
+        """The state, at which no element is folded, with a cover that resists folding until `begin`."""
+        self.slab.resist_folding(True)
+        self._forget_factors()
+        resisting = self.evaluate(state.slab.displacement, state.support.displacement, state.indentation, state.slab.projection,
+                                  state.history)
+        if resisting is None:
+            raise ConvergenceError("The cover is folded under an edge of the object; ask for load steps nearer to each other.")
+        return resisting
 
     def evaluate(self, slab_displacement: np.ndarray, support_displacement: np.ndarray, indentation: float,
                  projection: ContactProjection, history: BodyHistory | None = None) -> BodyState | None:

@@ -102,11 +102,11 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
         own = body.reevaluate_contact(found.state, body.friction.renewed(found.state))
         residual = body.residual_norm(own, force)
         if residual <= tolerance:
-            return Solution(own, iterations, residual)
+            return Solution(own, iterations, residual, own)
         if k >= settings.whole_passes:     # a remaining change oscillates: more friction, less pressure, less friction
             own = body.reevaluate_contact(found.state, body.friction.renewed(found.state, halfway=True))
         state = own
-    return Solution(None, iterations, found.residual_n)
+    return Solution(None, iterations, found.residual_n, found.last)
 
 
 def _newton(body, surface, state, force, tolerance, settings):

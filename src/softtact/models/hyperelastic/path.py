@@ -254,6 +254,7 @@ def _advance(body, surface, state, reached, stage, settings):
 
     An increment starts from the last converged state. Extrapolated displacements start with worse contact states and took as many
     iterations or more, since the Newton step is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
+    One that folds the cover, whether it converges or not, is repeated with a cover that resists, as in all increments after it.
     """
     iterations, increment = 0, stage.end - reached
     while True:
@@ -266,9 +267,12 @@ def _advance(body, surface, state, reached, stage, settings):
         start, moved = _start_of_increment(body, surface, start, control, stage.growth(reached, at))
         found = settle(body, moved, start, control.force, tolerance_at(_force(control, state), settings), settings)
         iterations += found.iterations
-        if found.state is not None and at >= stage.end:
+        if found.state is not None and at >= stage.end and not body.folds(found.state):
             found = augment(body, moved, found, control.force, settings)
             iterations += found.iterations
+        if body.folds(found.last):
+            state, increment, iterations = body.resisting_folding(state), at - reached, 0
+            continue
         if found.state is not None and at >= stage.end:
             return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
                             residual_n=found.residual_n, penetration_mm=body.penetration(found.state),

@@ -15,10 +15,11 @@ import scipy.sparse as sp
 from softtact.contact.friction import Coulomb
 from softtact.contact.penalty import Contact
 from softtact.fem.assembly import add_upper, upper_pattern, upper_positions
-from softtact.fem.elements import QUAD8
+from softtact.fem.elements import HEX20, QUAD8
 from softtact.fem.extruded_mesh import HexMesh, SheetMesh2D, extrude, interpolation_2d
 from softtact.fem.graded_mesh import CoverMesh, cover_mesh
 from softtact.fem.kernels import add_forces
+from softtact.fem.quadrature import lobatto_rule
 from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.fem.static_condensation import make_positive
 from softtact.linalg.symmetric_product import SymmetricProduct
@@ -28,6 +29,7 @@ from softtact.models.hyperelastic.rigid_contact import TopContact
 from softtact.models.hyperelastic.states import ContactHistory, ContactProjection, LinearGaps, ObjectSurface, SlabState
 
 _NO_WEIGHT = 1e-12
+_FOLDING_PENALTY_RATIO = 100.0     # quartic modulus over mu of a cover that resists folding, as of the frusta by default
 _AT_ONCE = 8     # elements whose tangents one thread makes positive at once; indefinite ones are often neighbours
 
 
@@ -203,7 +205,9 @@ class Slab:
         self.nodes = len(self.points)
         self.bottom = self.sheet_nodes.number[self.sheet_mesh.planes[0]]
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
-        self._add_cover(cover.law)
+        self._cover_law, self.resists_folding = cover.law, False
+        self._values_at: np.ndarray | None = None     # displacement of the cached values of `_beside_cells`
+        self.groups += self._cover_groups()
         self._add_sheet(sheet_mesh_2d, [sheet.law] * self.sheet_layers + [cover.law] * bound)
         self._joined = joined(self.solids)     # evaluating a hundred small blocks takes twice as long
         self._number_unknowns(sides, held_below_mm)
@@ -219,20 +223,37 @@ class Slab:
         others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top.faces)]
         return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
 
-    def _add_cover(self, law):
+    def _cover_groups(self):
         """Groups of the cover's elements; those with hanging nodes form separate groups, as they have more master nodes."""
         mesh = self.cover_mesh
         if not len(mesh.hexes):
-            return
+            return []
         alone = (mesh.hexes < mesh.free).all(axis=1)
-        block = self._cover_block(mesh.hexes[alone], law)
-        self.groups.append((mesh.hexes[alone], block))
+        groups = [(mesh.hexes[alone], self._cover_block(mesh.hexes[alone]))]
         if not alone.all():
             hanging = mesh.hexes[~alone]
-            self.groups.append(hanging_node_constraints(*mesh.masters(), hanging, self._cover_block(hanging, law)))
+            groups.append(hanging_node_constraints(*mesh.masters(), hanging, self._cover_block(hanging)))
+        return groups
 
-    def _cover_block(self, hexes, law):
-        return HexBlock(self.cover_mesh.points[hexes], law, reduced=True, quartic_penalty_ratio=self._quartic_penalty_ratio)
+    def _cover_block(self, hexes):
+        rule, ratio = HEX20.reduced, self._quartic_penalty_ratio
+        if self.resists_folding:
+            rule, ratio = lobatto_rule(3), max(ratio, _FOLDING_PENALTY_RATIO)
+        return HexBlock(self.cover_mesh.points[hexes], self._cover_law, rule=rule, quartic_penalty_ratio=ratio)
+
+    def resist_folding(self, resists: bool) -> None:
+        """Give the cover's elements points at their corners, which cannot turn inside out then, and a quartic penalty; or undo it.
+
+        Under an edge sharper than an element its corners fold, which a rule with eight points inside does not see.
+        """
+        if resists == self.resists_folding:
+            return
+        self.resists_folding, loops = resists, self.blocks[0].loops
+        groups = self._cover_groups()
+        self.groups[:len(groups)] = groups
+        self._joined, self._values_at = joined(self.solids), None
+        for block in self.blocks:
+            block.loops = loops
 
     def _add_sheet(self, mesh_2d, laws):
         """Like elements (nodes, block): of the strips around the lattice, and of each kind of cell; a law per layer."""
@@ -334,7 +355,7 @@ class Slab:
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
         self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
         self.product = SymmetricProduct(indptr, indices)
-        self._values_at: np.ndarray | None = None     # displacement of the cached values of `_beside_cells`
+        self._values_at = None
         self._values: dict[bool, np.ndarray] = {}
 
     def tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
