@@ -15,6 +15,7 @@ import trimesh
 from softtact.compiled import compiled
 
 _KEPT: "WeakKeyDictionary[trimesh.Trimesh, HeightField]" = WeakKeyDictionary()     # by their contents' hash
+NEAR_MM = 0.1         # height over the sensing surface, or depth below it, beyond which an object is moved to first touch
 NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 
 
@@ -79,6 +80,11 @@ class HeightField:
         over = ((corners[:, 0] >= x_mm[0]) & (corners[:, 0] <= x_mm[-1]) & (corners[:, 1] >= y_mm[0]) & (corners[:, 1] <= y_mm[-1]))
         height, _ = self(*(line.ravel() for line in np.meshgrid(x_mm, y_mm)))
         return float(min(corners[over, 2].min(initial=NO_CONTACT_MM), height.min()))
+
+    def near_touch(self, x_mm: np.ndarray, y_mm: np.ndarray) -> "HeightField":
+        """The underside moved down or up to `first_touch_mm` if it is far away, for models whose first guesses start there."""
+        away = self.first_touch_mm(x_mm, y_mm)
+        return self if abs(away) <= NEAR_MM else self.moved(np.array([0.0, 0.0, -away]))
 
     def points_below(self, height_mm: float) -> np.ndarray:
         """Corners (n, 2) of the parts of the facets below a height: their own corners there, and where their edges cross it."""

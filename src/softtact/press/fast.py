@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 _ROUND_OFF = 1e-6         # of a force
 # Search of the force at a depth: the least force over the largest, force over depth to this power at first, and the relative error.
 _LEAST_FORCE, _POWER, _DEPTH_TOLERANCE, _SECANTS = 1e-6, 1.3, 2e-3, 40
-_NEAR_MM = 0.1            # height over the sensing surface, or depth below it, beyond which an object is moved to first touch
 
 
 def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl) -> PressResult:
@@ -50,7 +49,8 @@ def press_underside(sensor: "Sensor", surface: HeightField, forces: np.ndarray, 
     """
     start = time.perf_counter()
     if model == "foundation":
-        return _on_foundation(sensor, _near_touch(sensor, surface), forces, RunControl(label=""), start)
+        near = surface.near_touch(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+        return _on_foundation(sensor, near, forces, RunControl(label=""), start)
     touch = first_touch_mm(sensor, surface)
     press = _elastic(sensor, surface, forces, touch)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
@@ -189,7 +189,8 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, c
     """Press load step by load step with the foundation model, which has no body to keep."""
     start = time.perf_counter()
     sensor.prepared("foundation", control.threads)
-    return _on_foundation(sensor, _near_touch(sensor, HeightField.of(placed)), forces, control, start)
+    near = HeightField.of(placed).near_touch(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+    return _on_foundation(sensor, near, forces, control, start)
 
 
 def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, control: RunControl, start: float) -> PressResult:
@@ -214,12 +215,6 @@ def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, c
     points, _ = _of_candidates(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
                                lambda _: load_steps[-1].depth)
     return so_far(points)
-
-
-def _near_touch(sensor: "Sensor", surface: HeightField) -> HeightField:
-    """The underside moved to first touch if it is far away, since the model's first guesses start at the sensing surface."""
-    away = first_touch_mm(sensor, surface)
-    return surface if abs(away) <= _NEAR_MM else surface.moved(np.array([0.0, 0.0, -away]))
 
 
 def _steps_on_pad(compliance, points, forces, stop, touch):

@@ -15,13 +15,18 @@ import trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.height_rates import gap_rates, touch_rates
+from softtact.contact.object_points import ObjectPoints
 from softtact.contact.underside import Underside
-from softtact.contact.unilateral import LEAST_REACH_MM, REACH
+from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import InputError
 from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
-from softtact.press.cache import cached_compliance
+from softtact.models.foundation.compliance import FoundationCompliance
+from softtact.models.foundation.dof_maps import Places
+from softtact.models.foundation.gradient import Balance, Tangent
+from softtact.models.foundation.solve import FoundationMaps, settled_contacts
+from softtact.press.cache import cached_compliance, cached_foundation
 from softtact.readout.capacitance import felt_displacement
 from softtact.readout.capacitance_rates import counts_rates, felt_rates
 from softtact.readout.taxels import Capacitance, counts_of
@@ -88,7 +93,8 @@ def gradient(result: "PressResult", of: str, by: Sequence[str]) -> Gradient:
     _check(result, of)
     rates = _DIFFERENTIATED[result.model](result, names)
     values = {"depth": lambda: rates.depth, "deformation_map": lambda: rates.maps, "tactile_map": lambda: rates.counts}[of]()
-    return Gradient(of, np.moveaxis(values, 0, -1), tuple(names), tuple(f"{_OF[of]}/{_UNITS[name]}" for name in names),
+    units = _UNITS | ({"young": "1"} if result.model == "foundation" else {})
+    return Gradient(of, np.moveaxis(values, 0, -1), tuple(names), tuple(f"{_OF[of]}/{units[name]}" for name in names),
                     rates.margin.T)
 
 
@@ -111,7 +117,7 @@ def _check(result, of):
         raise InputError(f"The {result.model} model has no gradients; press with model='elastic' or 'foundation'.")
     if result.origin is None:
         raise InputError("This result does not know its sensor and object, which a gradient needs: it was read from a file, "
-                         "pressed in another process, along a motion or over time; press again with Sensor.press and force_n.")
+                         "pressed in a batch, along a motion or over time; press again with Sensor.press and force_n.")
     if (untouched := np.flatnonzero(result.pad_force_n <= 0)).size:
         raise InputError(f"At {result.normal_force_n[untouched[0]]:g} N the object rests on the shell and touches nothing of the "
                          "pad, so there is no gradient; give a narrower object, or another pose.")
@@ -163,10 +169,18 @@ def _of_elastic(result, names):
 
 
 def _pressed_layer(result, compliance, surface):
-    """The contact of the press once more, with the points that it can have touched."""
-    deepest = float(result.indentation_mm.max())
-    points = Underside(surface, compliance.grid).nodes(min(REACH * deepest + LEAST_REACH_MM, result.origin.sensor.spec.deepest_mm))
+    """The contact of the press once more, with its points."""
+    underside = Underside(surface, compliance.grid)
+    points = underside.nodes(_reach(result, underside, compliance, result.origin.sensor.spec.deepest_mm))
     return points, press_layer(compliance, points, result.normal_force_n)
+
+
+def _reach(result, underside, compliance, deepest_mm):
+    """Height over first touch up to which the press had points, as in `press.fast`."""
+    reach = REACH * underside.depth_on_springs(result.normal_force_n[-1], compliance.foundation_modulus) + LEAST_REACH_MM
+    while reach < deepest_mm and RISE * result.indentation_mm[-1] > reach:
+        reach *= REACH
+    return min(reach, deepest_mm)
 
 
 def _by_names(names, layer, origin, points, grid, surface):
@@ -201,4 +215,73 @@ def _by_gap_at_rest(spec, read):
     return (thicker - thinner) / (2 * _THICKER * spec.upper_layer_mm)
 
 
-_DIFFERENTIATED: dict[str, Callable[["PressResult", list[str]], _Rates]] = {"elastic": _of_elastic}
+# --- the foundation model ---
+
+
+def _of_foundation(result, names):
+    origin, spec = result.origin, result.origin.sensor.spec
+    compliance, in_pose = origin.sensor.prepared("foundation"), HeightField.of(origin.placed)
+    surface = in_pose.near_touch(spec.map_x_mm, spec.map_y_mm)
+    underside = Underside(surface, compliance.grid)
+    points = underside.points(_reach(result, underside, compliance, spec.thickness_mm))
+    lift = [0.0, 0.0, in_pose.lowest_mm - surface.lowest_mm]
+    near = _Near(result, surface, points, lambda places: _of_pose(origin)(places + lift), _others(origin, names, points))
+    steps = list(settled_contacts(compliance, points, result.normal_force_n))
+    balance = Balance(compliance, points, steps[0])
+    found = [near.rates(balance.of(contact), names) for contact in steps]
+    return near.together(found, [contact.load_step for contact in steps], names)
+
+
+def _others(origin, names, points):
+    """Compliances of the sensor with a thinner and a thicker upper layer, where they are needed."""
+    sensor = origin.sensor
+    return [cached_foundation(other, sensor.laws) for other in _thinner_and_thicker(sensor.spec)] if "thickness" in names else []
+
+
+@dataclass(frozen=True)
+class _Near:
+    """The underside near the sensing surface, with what is needed to differentiate the foundation model's load steps."""
+
+    result: "PressResult"
+    surface: HeightField
+    points: ObjectPoints
+    moving: Callable[[np.ndarray], np.ndarray]
+    others: list[FoundationCompliance]
+
+    @property
+    def apart_mm(self):
+        return 2 * _THICKER * self.result.origin.sensor.spec.upper_layer_mm
+
+    def rates(self, balance, names):
+        """`Rates` of a load step by each name."""
+        contact, found = balance.contact, {}
+        tangent = Tangent.settled(balance, contact.points.gap, contact.load_step.force_n)
+        if set(names) & set(_POSE):
+            rows = gap_rates(self.surface, balance.places.compliance.grid, contact.points, self.moving)
+            found |= {name: tangent.by_gaps(row) for name, row in zip(_POSE, rows, strict=True) if name in names}
+        if {"force", "young"} & set(names):
+            found["force"] = tangent.by_force()
+            found["young"] = tangent.by_moduli(found["force"])
+        if "thickness" in names:
+            pair = [Balance(other, self.points, contact) for other in self.others]
+            found["thickness"] = tangent.by_compliance(*pair, self.apart_mm, contact.points.gap)
+        return [found[name] for name in names]
+
+    def together(self, found, load_steps, names):
+        """The `_Rates` of all load steps; found[step][name]."""
+        origin, spec = self.result.origin, self.result.origin.sensor.spec
+        touch = touch_rates(self.surface, spec.map_x_mm, spec.map_y_mm, self.moving)
+        depth = np.array([[one.depth for one in of_step] for of_step in found]).T
+        depth -= np.array([touch[list(_POSE).index(name)] if name in _POSE else 0.0 for name in names])[:, None]
+        places = Places(origin.sensor.prepared("foundation"), self.points)
+        maps = np.stack([places.maps(*(np.stack([getattr(one, part) for one in of_step], axis=1) for part in ("load", "lateral")))
+                         for of_step in found], axis=1)
+        if "thickness" in names:
+            thinner, thicker = (FoundationMaps(other, self.points)(load_steps) for other in self.others)
+            maps[names.index("thickness")] += (thicker - thinner) / self.apart_mm
+        return _Rates(depth, maps, np.array([[one.margin for one in of_step] for of_step in found]).T,
+                      lambda: counts_rates(spec, self.result.thinning_map_mm, maps))
+
+
+_DIFFERENTIATED: dict[str, Callable[["PressResult", list[str]], _Rates]] = {
+    "elastic": _of_elastic, "foundation": _of_foundation}

@@ -229,9 +229,10 @@ class PressResult:
         """Derivatives of the settled contact: a `Gradient` of `of` by each parameter of `by`, at each load step.
 
         of: tactile_map, deformation_map or depth (`indentation_mm`)
-        by: pose (x, y in mm and rx, ry, rz in degrees, as in `Pose.from_values`), force (N), young, thickness
-        Of presses by force with the elastic or the foundation model. Raises InputError for others, where the object touches nothing
-        or rests on the shell, and for unknown names.
+        by: pose (x, y in mm and rx, ry, rz in degrees, as in `Pose.from_values`) or one of these five; force (N); young (MPa of the
+        elastic layer, or a common factor of the foundation model's moduli); thickness (mm, of the cover or the only layer)
+        Of presses by force with the elastic or the foundation model; accuracy: docs/how-to/find_a_pose_from_taxels.md. Raises
+        InputError for others, where the object touches nothing or rests on the shell, and for unknown names.
         """
         from softtact.press import gradient
 

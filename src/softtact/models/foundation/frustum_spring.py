@@ -173,6 +173,11 @@ class FrustumLaw:
         """
         return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
 
+    def rise_rate(self, sideways: np.ndarray, force: np.ndarray, sideways_rate: np.ndarray, force_rate: np.ndarray) -> np.ndarray:
+        """Rate of `rise` from those of its arguments."""
+        rate = self.tip_radius_mm * (self.lean * sideways_rate - self.tip_radius_mm * force_rate / self.upright)
+        return np.where(self.rise(sideways, force) > 0, rate, 0.0)
+
     def stiffening(self, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """Additional stiffness (b, 2, 2) of (displacement, tilt) of frusta under forces (b,) in N relative to rest, and its
         derivative by their compression, per mm.
@@ -181,6 +186,12 @@ class FrustumLaw:
         growth = np.where((place < self.lateral_at_mm[-1])[:, None], self._stiffness_slope(place), 0.0)
         more = self._stiffness(place) - self.stiffness[0]
         return tuple(values[:, [0, 1, 1, 2]].reshape(-1, 2, 2) for values in (more, growth))
+
+    def stiffening_rate(self, force: np.ndarray) -> np.ndarray:
+        """Derivative (b, 2, 2) by the compression of the second part of `stiffening`, per mm2."""
+        place = np.clip(self.extension(force), 0.0, self.lateral_at_mm[-1])
+        curving = np.where((place < self.lateral_at_mm[-1])[:, None], self._stiffness.derivative(2)(place), 0.0)
+        return curving[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
 
     @cached_property
     def _stiffness(self):

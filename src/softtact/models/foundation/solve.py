@@ -224,10 +224,38 @@ def press_foundation(compliance: FoundationCompliance, points: ObjectPoints, for
     """Yield a `FoundationLoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not
     reached.
     """
+    for found in settled_contacts(compliance, points, forces_n, settings=settings):
+        yield found.load_step
+
+
+@dataclass(frozen=True)
+class SettledContact:
+    """A load step with what it was solved with: the active sets, the frusta's forces q (b,) in N, and the effects of finite
+    displacements; patch (c, n): shares of the nodes in patches;  points, contact_compliance (c,): of the patches beside edges in
+    mm/N, and possible (c,), which of them can touch, as last updated
+    """
+
+    load_step: FoundationLoadStep
+    touching: np.ndarray
+    standing: np.ndarray
+    q: np.ndarray
+    effects: Effects
+    patch: Any
+    points: ObjectPoints
+    contact_compliance: np.ndarray
+    possible: np.ndarray
+
+
+def settled_contacts(compliance: FoundationCompliance, points: ObjectPoints, forces_n: Iterable[float], *,
+                     settings: FoundationSettings = FoundationSettings()) -> Iterator[SettledContact]:
+    """Yield a `SettledContact` for each force, as `press_foundation` its load step."""
     press = _Press(compliance, points, settings)
     path = [(0.0, press.first())]
     for force in forces_n:
-        yield _advance(press, path, float(force))
+        load_step = _advance(press, path, float(force))
+        state = path[-1][1]
+        yield SettledContact(load_step, state.touching, state.standing, state.q, state.effects, press.patch,
+                             press.touched, press.slab.contact_compliance, press.possible)
 
 
 def lifted(compliance: FoundationCompliance, points: ObjectPoints, depth_mm: float) -> FoundationLoadStep:
@@ -300,6 +328,7 @@ def _continued(path, force):
 class _Press:
     def __init__(self, compliance, points, settings):
         self.law, self.points, self.settings = compliance.law, points, settings
+        self.touched = points     # as of the last update of the contact
         places = Places(compliance, points)
         self.frusta = len(places.frusta)
         self.patch = patches_of(points, compliance.grid, settings.patches)
@@ -357,7 +386,7 @@ class _Press:
 
         Patches at an edge of the object get a contact compliance, and those that it has left cannot touch.
         """
-        points = self.points.as_deep(depth)
+        points = self.touched = self.points.as_deep(depth)
         contact_compliance = self.patch.power(2) @ np.minimum(self.edges(points, moved, depth), _FREE)
         self.possible = contact_compliance < _SOFTEST
         state.touching = state.touching & self.possible
@@ -418,6 +447,12 @@ class _Slab:
         self.matrix[c:, :c] = self.matrix[:c, c:].T
         self.matrix[c:, c:] = compliance[n:, n:]
         self._hard = np.diag(self.matrix)[:c].copy()
+
+    @property
+    def contact_compliance(self):
+        """The springs (c,) that `soften` added, in mm/N."""
+        c = len(self._hard)
+        return self.matrix[range(c), range(c)].astype(float) - self._hard
 
     def soften(self, contact_compliance):
         """Add a spring of compliance (c,) in mm/N in series with each patch."""

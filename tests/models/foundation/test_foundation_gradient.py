@@ -1,0 +1,120 @@
+"""Derivatives of the foundation model against differences of balances, which Newton's method settles in double precision."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from foundation_study import SMALL, points_of
+from support.laws import LAWS
+
+from softtact.models.foundation.gradient import Balance, Tangent
+from softtact.models.foundation.solve import settled_contacts
+from softtact.models.quarter_symmetry import ParityBlocks
+from softtact.press.sensor import Sensor
+
+FORCE, POSE = 6.0, (0.3, -0.4, 0.0, 4.0, -3.0, 20.0)
+FIELDS = ("force", "q", "depth", "loads", "lateral", "rise", "shift")
+TOLERANCE = 1e-5     # in the norm of each kind of unknown
+
+
+def ellipsoid(subdivisions=4):
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=1.0)
+    mesh.apply_scale([5.0, 4.0, 4.5])
+    return mesh
+
+
+@pytest.fixture(scope="module")
+def pressed(compliance):
+    """The balance of an ellipsoid on the small sensor, and the gaps of its points."""
+    points = points_of(ellipsoid(), compliance, POSE)
+    contact = next(settled_contacts(compliance, points, [FORCE]))
+    return Balance(compliance, points, contact), contact.points.gap
+
+
+@pytest.fixture(scope="module")
+def tangent(pressed):
+    return Tangent.settled(*pressed, FORCE)
+
+
+def assert_difference(rates, upper, lower, step):
+    for name in FIELDS:
+        wanted = (getattr(upper.at, name) - getattr(lower.at, name)) / (2 * step)
+        apart = np.linalg.norm(getattr(rates.unknowns, name) - wanted)
+        assert apart <= TOLERANCE * np.linalg.norm(wanted) + 1e-9, name
+
+
+def test_newtons_method_settles_the_balance_quadratically_from_the_solvers_load_step(pressed, tangent):
+    """So the tangent is that of the residuals, and the residuals are those of the solver."""
+    balance, gap = tangent.balance, pressed[1]
+    aside = tangent.at.plus(replace(balance.nothing(), lateral=np.full_like(tangent.at.lateral, 1e-4),
+                                    loads=np.full_like(tangent.at.loads, 1e-3), depth=1e-3))
+    sizes = []
+    for _ in range(4):
+        sizes.append(np.abs(balance.residual(aside, gap, FORCE).lateral).max())
+        aside = aside.plus(Tangent(balance, aside).solve(balance.residual(aside, gap, FORCE)))
+    assert sizes[2] < 1e-4 * sizes[0] and sizes[3] < 1e-10
+    assert np.abs(tangent.at.force - pressed[0].unknowns.force).max() < 5e-3 * FORCE
+
+
+def test_rates_by_the_gaps_are_differences_of_balances(pressed, tangent):
+    (balance, gap), step = pressed, 1e-6
+    way = np.cos(np.arange(len(gap)))
+    upper, lower = (Tangent.settled(balance, gap + sign * step * way, FORCE) for sign in (1, -1))
+    assert_difference(tangent.by_gaps(way), upper, lower, step)
+
+
+def test_rates_by_the_force_are_differences_of_balances(pressed, tangent):
+    upper, lower = (Tangent.settled(*pressed, FORCE + sign * 1e-5) for sign in (1, -1))
+    assert_difference(tangent.by_force(), upper, lower, 1e-5)
+
+
+def stiffer(compliance, factor):
+    """The compliance of the same sensor with `factor` times all moduli."""
+    law = compliance.law
+    blocks = {name: ParityBlocks(getattr(compliance, name).blocks.astype(float) / factor)
+              for name in ("surface", "sideways", "lateral", "lateral_self")}
+    law = replace(law, force_n=factor * law.force_n, stiffness=factor * law.stiffness, upright=factor * law.upright)
+    return replace(compliance, **blocks, membrane=ParityBlocks(compliance.membrane.blocks.astype(float)), law=law)
+
+
+def test_rates_by_the_moduli_are_those_by_a_stiffer_compliance(compliance, pressed, tangent):
+    points, contact, step = points_of(ellipsoid(), compliance, POSE), tangent.balance.contact, 1e-5
+    lower, upper = (Balance(stiffer(compliance, factor), points,
+                            replace(contact, contact_compliance=contact.contact_compliance / factor))
+                    for factor in (1 - step, 1 + step))
+    by_compliance = tangent.by_compliance(lower, upper, 2 * step, pressed[1])
+    by_moduli = tangent.by_moduli(tangent.by_force())
+    for name in FIELDS:
+        found, wanted = (getattr(one.unknowns, name) for one in (by_compliance, by_moduli))
+        assert np.linalg.norm(found - wanted) <= 1e-4 * np.linalg.norm(wanted) + 1e-9, name
+    assert by_compliance.margin == pytest.approx(by_moduli.margin, rel=1e-3)
+
+
+def test_rates_of_a_frustums_rise_and_stiffening_are_differences_of_them(law):
+    sideways, force, rates, step = np.full(4, 0.05), np.array([1e-4, 1e-3, 0.01, 0.1]), np.array([1.0, -2.0, 0.5, 1.0]), 1e-7
+    upper, lower = (law.rise(sideways + sign * step * rates, force + sign * step * 0.3) for sign in (1, -1))
+    found = law.rise_rate(sideways, force, rates, np.full(4, 0.3))
+    np.testing.assert_allclose(found, (upper - lower) / (2 * step), rtol=1e-6, atol=1e-9)
+    assert found[0] != 0
+    (_, above), (_, below) = (law.stiffening(force + sign * 1e-6) for sign in (1, -1))
+    by_force = law.stiffening_rate(force) * law.slope(force)[:, None, None]
+    np.testing.assert_allclose(by_force, (above - below) / 2e-6, rtol=1e-2, atol=1e-3 * np.abs(by_force).max())
+
+
+@pytest.mark.parametrize(("by", "step"), [("force", 0.4), ("x", 0.15), ("ry", 1.0)])
+def test_a_gradient_of_a_press_is_about_the_difference_of_presses(compliance, by, step):
+    """Within 5 %: the solver's presses are settled to some micrometres only, so steps must be large."""
+    sensor, mesh = Sensor(SMALL, LAWS, prepared_models={"foundation": compliance}), ellipsoid(subdivisions=6)
+    mesh.apply_scale(2.5)     # no point of it counts as beside an edge
+    pose = np.array([*POSE[:2], 3.0, *POSE[3:]])
+
+    def press(by_pose=0.0, by_force=0.0):
+        return sensor.press(mesh, pose=pose + by_pose, force_n=FORCE + by_force, model="foundation", label="")
+
+    aside = {"x": np.eye(6)[0], "ry": np.eye(6)[4], "force": 0.0}[by]
+    upper, lower = (press(sign * step * aside, sign * step * (by == "force")) for sign in (1, -1))
+    result = press()
+    for of, name in (("tactile_map", "tactile_map"), ("deformation_map", "deformation_map_mm"), ("depth", "indentation_mm")):
+        found, wanted = result.gradient(of, by)[by], (getattr(upper, name) - getattr(lower, name)) / (2 * step)
+        assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted) + 2.5e-3 * (of == "depth"), of
