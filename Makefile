@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 DEFAULT_STUDIES = config skin probe grasps decide markers real
 TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps tiny-decide tiny-markers tiny-real
 
-.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide markers real test test-slow lint advice bench docs numbers results clean
+.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide markers real test test-slow lint advice bench docs gallery numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -74,10 +74,14 @@ advice: .venv/tested
 	touch $@
 
 # The documentation as a site, from docs/ into site/; a warning of Sphinx is an error.
-docs: numbers
+docs: numbers gallery
 	$(BIN)/python scripts/write_results.py --check
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d site/.doctrees docs site
 	@echo "Open site/index.html"
+
+# The pictures of docs/gallery.md, each by its own lines there.
+gallery: .venv/tested
+	$(BIN)/python scripts/draw_gallery.py
 
 numbers: .venv/tested
 	$(BIN)/python scripts/write_numbers.py
