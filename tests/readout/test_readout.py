@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from softtact.readout.registry import Readings, Unlabelled, labelled
 from softtact.readout.virtual_sensor import amplified, converted, random_walk
 
 
@@ -36,3 +37,13 @@ def test_without_a_step_and_a_limit_the_converter_gives_what_it_gets():
 
 def test_a_dead_taxel_reads_zero_whatever_the_noise():
     assert converted(np.array([500.0, 500.0]), noise=np.array([3.0, 3.0]), dead=np.array([True, False])).tolist() == [0, 503]
+
+
+def test_counts_get_their_labels_when_they_are_asked_for():
+    counts = np.arange(6.0).reshape(1, 2, 3)
+    readings = Readings(taxels=Unlabelled(counts, ("step", "row", "column"), "counts"), depth=labelled(np.ones(1), ("step",)))
+    assert readings.array("taxels") is counts and isinstance(readings.data["taxels"], Unlabelled)
+    assert list(readings) == ["taxels", "depth"] and "taxels" in readings and "none" not in readings
+    asked = readings["taxels"]
+    assert asked.dims == ("step", "row", "column") and asked.attrs == {"units": "counts"} and readings["taxels"] is asked
+    assert readings.array("taxels").tolist() == counts.tolist()

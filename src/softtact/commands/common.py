@@ -135,6 +135,18 @@ def check_pictures(*paths: Path | None) -> None:
         require("matplotlib", path)
 
 
+def import_trimesh() -> None:
+    """Import trimesh without packages that it loads wherever they are, which takes a third of a second, and that no command uses
+    through it. In a command's process alone: trimesh works without them from then on."""
+    hidden = [name for name in ("cascadio", "meshio", "networkx") if name not in sys.modules]
+    try:
+        sys.modules |= dict.fromkeys(hidden)     # type: ignore[arg-type]
+        import trimesh  # noqa: F401
+    finally:
+        for name in hidden:
+            del sys.modules[name]
+
+
 def pairs(option: str, texts: Iterable[str] | None) -> Iterator[tuple[str, str]]:
     """(name, value) of texts NAME=VALUE, each name once."""
     seen: dict[str, str] = {}

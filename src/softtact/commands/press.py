@@ -15,6 +15,7 @@ from softtact.commands.common import (
     check_forces,
     check_names,
     check_pictures,
+    import_trimesh,
     origin,
     pairs,
     pose_of,
@@ -138,6 +139,7 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
     """
     from dataclasses import replace
 
+    import_trimesh()
     from softtact.geometry.meshes import check_over_sensor, place
 
     mesh, repairs = read_object(options, path)
@@ -260,8 +262,8 @@ def _written(result, files, options, sensor):
         print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
               "name another model to use it.", file=sys.stderr)
     summary = summary_on_layers(result) if result.deformation_map_mm is not None else summary_on_solids(result)
-    others = {name: or_none(reading.values) for name, reading in result.readings.items()
-              if name not in ("taxels", "points") and not is_image(reading)}
+    others = {name: or_none(result.readings[name].values) for name in result.readings
+              if name not in ("taxels", "points") and not is_image(result.readings[name])}
     facts = {"repairs": [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair], "readings": others}
     return summary | facts | summary_of_gel(result) | {"written": [str(path) for path in files.all if path]}
 

@@ -80,7 +80,7 @@ def marker_motion(result: "PressResult") -> "np.ndarray | None":
     """(step, marker) in px: how far each marker moved in the image; None without markers."""
     import numpy as np
 
-    for reading in result.readings.values():
+    for reading in (result.readings[name] for name in result.readings if name != "taxels"):
         if "rest_x_px" in reading.coords:
             rest = np.column_stack([reading["rest_x_px"].values, reading["rest_y_px"].values])
             return np.linalg.norm(reading.values - rest, axis=2)

@@ -17,15 +17,17 @@ can sink: an evenly meshed sphere of 30 mm has 8.3 % of its points within it, th
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from scipy.spatial import ConvexHull, QhullError
 
 from softtact.errors import InputError
 from softtact.geometry.meshes import default_pose, facets_over, read_mesh, read_triangles
 from softtact.geometry.pose import Pose
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 REACH_MM = 2.5  # frusta 0.5, sheet 0.5, cover 1.5
 TOTAL_THRESHOLD = 10.0
@@ -112,12 +114,14 @@ def choose_model(NPt: int, CHt: int, NPo: int, CHo: int, *, rule: str = "any", t
 
 
 def score_objects(paths: Sequence[str | Path], objects: Sequence[dict[str, Any]], *, footprint_mm: tuple[float, float],
-                  rule: str = "any", thresholds: dict[str, Any] | None = None, reach_mm: float = REACH_MM) -> pd.DataFrame:
+                  rule: str = "any", thresholds: dict[str, Any] | None = None, reach_mm: float = REACH_MM) -> "pd.DataFrame":
     """Table of counts and chosen model, a row for each of `paths`.
 
     objects : list of {name, unit, pose}, in the order of `paths`; pose is six numbers, or missing for centred
     thresholds : {total, overlap}
     """
+    import pandas as pd
+
     rows = []
     for path, entry in zip(paths, objects, strict=True):
         pose = Pose.from_values(entry["pose"]) if entry.get("pose") is not None else None

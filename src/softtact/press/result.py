@@ -7,10 +7,10 @@ called `reading_NAME`, and its dimensions and coordinates end in `_of_NAME`. The
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from softtact.inputs import in_one_sentence
 from softtact.models.solid.result import SolidFields
 from softtact.press.objects import PlacedObject
 from softtact.readout.points import labelled_points
-from softtact.readout.registry import labelled
+from softtact.readout.registry import Readings, labelled
 
 if TYPE_CHECKING:
     import xarray
@@ -60,7 +60,7 @@ class PressResult:
     """(step, y, x) in mm: how much thinner the layer is, as its taxels read it; `counts_of` of it gives the counts of the press.
     Of the elastic model each point reads its surroundings, which differ from the map beside edges and thin walls; the lower side
     may move, too. Elsewhere it is the deformation map, and files then hold that one alone."""
-    readings: "dict[str, xarray.DataArray]" = field(default_factory=dict)
+    readings: "Mapping[str, xarray.DataArray]" = field(default_factory=Readings)
     """What each of the sensor's readouts reads, by their names in its file; `step` is the first dimension. `taxels`: (step, row,
     column) in counts, the ideal reading, or that of a calibrated sensor long after the press."""
     normal_force_n: np.ndarray = field(metadata=_array("N", "step"))
@@ -146,6 +146,8 @@ class PressResult:
     """The sensor and the object of a press by forces, for `gradient`; neither written with the maps nor sent to other processes."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.readings, Readings):
+            object.__setattr__(self, "readings", Readings(self.readings))
         steps, down = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
         defaults: dict[str, Callable[[], np.ndarray]] = {
             "pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
@@ -185,8 +187,7 @@ class PressResult:
         """(step, row, column) in counts: `readings["taxels"]`. Raises InputError where the sensor has no taxels."""
         if "taxels" not in self.readings:
             raise InputError(f"{self.sensor} has no readout 'taxels'; its readings are {', '.join(self.readings) or 'none'}.")
-        values: np.ndarray = self.readings["taxels"].values
-        return values
+        return cast(Readings, self.readings).array("taxels")
 
     @property
     def slipping_share(self) -> np.ndarray:

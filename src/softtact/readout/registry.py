@@ -14,9 +14,10 @@ dataclass, checks its fields; `read` raises InputError where the readout does no
 sensor is loaded.
 """
 
+from collections import UserDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -135,9 +136,33 @@ def make_readout(name: str, entry: ReadoutEntry, *, where: str = "sensor") -> Re
         raise InputError(f"{place}: {str(error).removeprefix(f'{cls.__name__}.__init__() ')}; correct its keys.") from None
 
 
-def readings_of(readouts: Mapping[str, Readout], surface: SurfaceMotion) -> "dict[str, xarray.DataArray]":
-    """{name: readings} of the readouts."""
-    return {name: readout.read(surface) for name, readout in readouts.items()}
+class Unlabelled(NamedTuple):
+    """Readings without xarray, which takes half a second to load; the arguments of `labelled`."""
+
+    values: np.ndarray
+    dimensions: tuple[str, ...]
+    units: str
+
+
+class Readings(UserDict[str, Any]):
+    """{name: labelled readings}, some of which get their labels when they are first asked for."""
+
+    def __getitem__(self, name: str) -> "xarray.DataArray":
+        if isinstance(self.data[name], Unlabelled):
+            values, dimensions, units = self.data[name]
+            self.data[name] = labelled(values, dimensions, units=units)
+        found: xarray.DataArray = self.data[name]
+        return found
+
+    def array(self, name: str) -> np.ndarray:
+        """The values without their labels."""
+        values: np.ndarray = self.data[name].values
+        return values
+
+
+def readings_of(readouts: Mapping[str, Readout], surface: SurfaceMotion) -> Readings:
+    """The readings of the readouts; a readout whose class has `unlabelled` is asked for that."""
+    return Readings({name: getattr(readout, "unlabelled", readout.read)(surface) for name, readout in readouts.items()})
 
 
 def labelled(values: np.ndarray, dimensions: Sequence[str], *, units: str | None = None,

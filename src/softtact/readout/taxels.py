@@ -9,7 +9,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.readout.capacitance import ideal_counts
-from softtact.readout.registry import SurfaceMotion, labelled, register
+from softtact.readout.registry import SurfaceMotion, Unlabelled, labelled, register
 from softtact.readout.virtual_sensor import amplified, taxel_capacitance
 from softtact.sensors.base import BaseSpec
 from softtact.sensors.fields import FiniteSection
@@ -25,13 +25,17 @@ class Capacitance(FiniteSection):
     """Counts (step, row, column) of the sensor's taxels, long after the press and without noise."""
 
     def read(self, surface: SurfaceMotion) -> "xarray.DataArray":
+        """See `Capacitance`."""
+        values, dimensions, units = self.unlabelled(surface)
+        return labelled(values, dimensions, units=units)
+
+    def unlabelled(self, surface: SurfaceMotion) -> Unlabelled:
         """See `Capacitance`. Raises InputError for a sensor without layers between electrodes."""
         if surface.thinning_mm is None or not isinstance(surface.spec, BaseSpec):
             raise InputError(f"{surface.spec.name} has no layers between electrodes, which the readout 'capacitance' reads; take "
                              "points or strip.")
         surface.spec.need_taxels("the readout 'capacitance'")
-        return labelled(counts_of(surface.spec, surface.thinning_mm), ("step", "row", "column"),     # type: ignore[arg-type]
-                        units="counts")
+        return Unlabelled(counts_of(surface.spec, surface.thinning_mm), ("step", "row", "column"), "counts")     # type: ignore[arg-type]
 
 
 def relative_change(spec: "AnySpec", displacement_mm: np.ndarray, *, shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:

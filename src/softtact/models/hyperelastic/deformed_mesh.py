@@ -6,12 +6,13 @@ Cells are condensed during a press, but every state has the displacements of all
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import meshio
 import numpy as np
 
 from softtact.fem.elements import HEX20, HEX27, WEDGE18
 
 if TYPE_CHECKING:
+    import meshio
+
     from softtact.models.hyperelastic.body import LayeredBody
     from softtact.models.hyperelastic.states import BodyState
 
@@ -46,8 +47,10 @@ class PressedBody:
     top: np.ndarray
     pressure_mpa: np.ndarray
 
-    def to_meshio(self) -> meshio.Mesh:
+    def to_meshio(self) -> "meshio.Mesh":
         """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover, 5 a soft object."""
+        import meshio
+
         numbers = {region: number for number, region in enumerate(REGIONS)} | {"object": OBJECT_LAYER}
         layers = [np.full(len(cells.nodes), numbers[cells.region]) for cells in self.cells]
         return meshio.Mesh(self.points_mm, [(cells.kind, cells.nodes) for cells in self.cells], cell_data={"layer": layers})

@@ -12,7 +12,7 @@ A file (NetCDF) has the dimension `frame`; the labels of each frame are `sequenc
 and, where `surface_maps` is asked for, displacement_mm, traction_mpa (frame, y, x, direction) and slip (frame, y, x).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -98,7 +98,7 @@ def deepest_mm(spec: Any) -> float:
     return float((spec.readouts["depth"].model_extra or {})["max_mm"])
 
 
-def rest_readings(sensor: "Sensor") -> "dict[str, xarray.DataArray]":
+def rest_readings(sensor: "Sensor") -> "Mapping[str, xarray.DataArray]":
     """{name: (1, ...)} readings of camera and markers without an object."""
     from softtact.press.kinds import KINDS
     from softtact.readout.registry import readings_of
