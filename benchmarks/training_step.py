@@ -1,8 +1,8 @@
 """A training step of each network beside the least time that arithmetic and memory allow: `python benchmarks/training_step.py`.
 
 One thread, processor time, a step of 32 maps; half a minute. Floor of the printed network: multiplications and additions of the
-forward pass, three times (values, gradients of values and of weights), at the rate of a large matrix product here, and the traffic of
-Adam's four arrays (weights and two moments read and written, gradients read: 28 bytes a weight) at the rate of a large sum here.
+forward pass, three times (values, gradients of values and of weights), at the rate of a large matrix product here, and the traffic
+of Adam's four arrays (weights and two moments read and written, gradients read: 28 bytes a weight) at that of a large sum here.
 Writes benchmarks/results/training_step.json.
 """
 
@@ -66,7 +66,8 @@ def machine():
     """GFLOP/s of a matrix product in single precision, and GB/s of a sum of arrays, of one thread."""
     a, b = torch.rand(2, 2048, 2048)
     x, y = torch.rand(2, 50_000_000)
-    return {"gflop_s": 2e-9 * 2048**3 / processor_s(lambda: a @ b, 5), "gb_s": 1e-9 * 3 * x.nbytes / processor_s(lambda: x.add_(y), 5)}
+    return {"gflop_s": 2e-9 * len(a)**3 / processor_s(lambda: a @ b, 5),
+            "gb_s": 3e-9 * x.nbytes / processor_s(lambda: x.add_(y), 5)}
 
 
 def main():
