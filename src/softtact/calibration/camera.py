@@ -140,10 +140,8 @@ def find_contact(image: np.ndarray, background: np.ndarray, *, name: str = "the 
         raise InputError(f"{name}: it shows no contact: it differs from the untouched gel by {size.max():.1f} grey levels at most, "
                          f"by {np.median(size):.1f} usually; leave the image out, or press harder.")
     thin = max(1, max(size.shape) // _COARSE)
-    coarse = change[::thin, ::thin]
-    folded = sum(fftconvolve(coarse[..., k], coarse[..., k]) for k in range(3))
-    row, column = np.unravel_index(int(np.argmin(folded)), folded.shape)
-    x, y, odd = 0.5 * thin * column, 0.5 * thin * row, -float(folded.min()) / float((coarse**2).sum())
+    x, y, odd = _odd_middle(change[::thin, ::thin])
+    x, y = thin * x, thin * y
     rows, columns = np.mgrid[:size.shape[0], :size.shape[1]]
     distance = np.hypot(columns - x, rows - y)
     rings = np.minimum(distance.astype(int), int(distance.max()) - 1)
@@ -153,6 +151,31 @@ def find_contact(image: np.ndarray, background: np.ndarray, *, name: str = "the 
         raise InputError(f"{name}: its contact is not that of a round ball; press with a ball, one contact in each image, or leave "
                          "the image out.")
     return float(x), float(y), radius
+
+
+def _odd_middle(change, allowed=None):
+    """Column, row of the point about which a difference is most odd, in halves, and the share of it that is.
+
+    allowed: where the point may lie, for each half column and row
+    """
+    folded = sum(fftconvolve(change[..., k], change[..., k]) for k in range(3))
+    row, column = np.unravel_index(int(np.argmin(folded if allowed is None else np.where(allowed, folded, np.inf))), folded.shape)
+    return 0.5 * column, 0.5 * row, -float(folded[row, column]) / float((change**2).sum())
+
+
+def odd_middle(change: np.ndarray, *, near_px: tuple[float, float], within_px: float) -> tuple[float, float]:
+    """Column and row of the point about which a difference (rows, columns, 3) from the untouched gel is most odd: a ball's middle.
+
+    near_px, within_px: the point lies within so many px of a place, and pixels up to three times as far take part
+    """
+    first = [max(0, int(place - 3 * within_px)) for place in near_px]
+    last = [int(place + 3 * within_px) + 1 for place in near_px]
+    part = change[first[1]:last[1], first[0]:last[0]].astype(float)
+    part = ndimage.gaussian_filter(part - np.median(part, axis=(0, 1)), (1, 1, 0))
+    half_y, half_x = np.mgrid[:2 * part.shape[0] - 1, :2 * part.shape[1] - 1]
+    allowed = np.hypot(0.5 * half_x + first[0] - near_px[0], 0.5 * half_y + first[1] - near_px[1]) <= within_px
+    x, y, _ = _odd_middle(part, allowed)
+    return first[0] + x, first[1] + y
 
 
 def _unevenness(size, x, y, radius):

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 import pandas as pd
 
 from softtact.evaluation.decisions import COLUMNS, UNDECIDED, below, mean_over_objects, row, verdict_of
-from softtact.studies.real.labelled import SMALL, WHEEL
+from softtact.studies.real.labelled import AROUND_SCORED, SHADOWS, SMALL, WHEEL
 from softtact.studies.real.stages.force import ELASTIC
 from softtact.studies.real.stages.markers import FORMULAS, LAYER, PHYSICS, SPLINE
 
 DEPTH_ERROR, MARKERS_ERROR, SHEARED_ERROR = 0.05, 0.48, 0.25
+SAME_LEVELS = 0.05      # grey levels: a smaller change of the error is none
 MADE = "made data: nothing was measured"
 
 
@@ -24,6 +25,8 @@ def claims_of_real(tables: Mapping[str, pd.DataFrame], *, limits: Mapping[str, f
     rows = [*_force(tables["gel_force"], judged), *_markers(tables["markers"], tables["other_markers"], markers_made, sheared)]
     for name, limit in limits.items():
         rows += _shading(name, tables["shading"], limit, made[name])
+        rows += _shadows(name, tables["shading"], made[name])
+    rows += [_labels(name, own, made[name]) for name, own in tables["circles"].groupby("set", sort=False)]
     rows += [_size(name, own, made[name], stated[name]) for name, own in tables["ball_size"].groupby("set", sort=False)]
     return pd.DataFrame(rows, columns=COLUMNS)
 
@@ -74,7 +77,41 @@ def _shading(name, table, limit, made):
         yield row(f"The table predicts the colours of held-out presses of {name}, {circles} circles", "shading",
                   "no limit" if limit is None else f"at most {limit:g} grey levels",
                   MADE if made else f"MAE {estimate.mean:.2f}; {others}", verdict,
-                  "mean absolute error in the labelled circle", "tables/shading.csv", uncertainty=estimate.in_words(".2f"))
+                  "mean absolute error in the labelled circle", "tables/shading.csv",
+                  uncertainty=f"{estimate.in_words('.2f')}; {_of_seeds(own, 'table', circles)}")
+
+
+def _of_seeds(own, model, circles, score="mae"):
+    """The least and the largest mean over the splits, in words."""
+    means = own[(own.model == model) & (own.circles == circles)].groupby("seed")[score].mean()
+    return f"{len(means)} splits, {means.min():.2f} to {means.max():.2f}"
+
+
+def _shadows(name, table, made):
+    """Against the same table without shadows, press by press: less error around the circle, and none more inside."""
+    own = table[(table.set == name) & (table.circles == "found")]
+    means = own[own.model.isin(["table", SHADOWS])].groupby(["model", "press"])[["mae", "around_mae"]].mean()
+    plain, shaded = means.loc["table"], means.loc[SHADOWS]
+    gain = mean_over_objects((shaded - plain).around_mae)
+    more = float((shaded - plain).mae.mean())
+    none = bool((shaded == plain).all(axis=None))
+    verdict = UNDECIDED if made or none or more > SAME_LEVELS else below(gain, 0.0)
+    words = "no shadows are seen in the presses" if none else (
+        f"MAE around {shaded.around_mae.mean():.2f}, without {plain.around_mae.mean():.2f}; "
+        f"in the circle {shaded.mae.mean():.2f} and {plain.mae.mean():.2f}")
+    yield row(f"Cast shadows explain held-out presses of {name}", "shading", "less error around, none more in the circle",
+              MADE if made else words, verdict, f"mean absolute error from 1 to {AROUND_SCORED:g} labelled radii, found circles",
+              "tables/shading.csv", uncertainty=f"change {gain.in_words('.2f')}; {_of_seeds(own, SHADOWS, 'found', 'around_mae')}")
+
+
+def _labels(name, own, made):
+    """Whether two ways of finding a contact's middle agree with its label, or with each other only."""
+    label, odd, both = (own[f"{one}_px"].median() for one in ("found_minus_label", "odd_minus_label", "odd_minus_found"))
+    off = both < 0.5 * min(label, odd)
+    return row(f"The labelled circles of {name} lie where the images show them", "shading", "not stated",
+               MADE if made else f"found to label {label:.1f} px, most odd to label {odd:.1f} px, most odd to found {both:.1f} px",
+               UNDECIDED if made else verdict_of(not off), "not so where middles found by the shading and by oddness lie less than half "
+               "as far from each other as each from the label; medians", "tables/circles.csv", uncertainty=f"{len(own)} presses")
 
 
 def _size(name, own, made, stated):

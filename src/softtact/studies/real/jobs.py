@@ -4,7 +4,7 @@
     markers/IMAGE.csv                      measured motion of markers
     paths/PATH.nc                          forces and surfaces under a ball by the solid model
     shading/SET.yaml, markers/gel.json     what was fitted
-    tables/gel_force.csv, markers.csv, marker_motion.csv, shading.csv, ball_size.csv, claims.csv
+    tables/gel_force.csv, markers.csv, marker_motion.csv, shading.csv, ball_size.csv, circles.csv, claims.csv
     figures/, report.html
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 from softtact.studies.jobs import Job, figure_files
 from softtact.studies.real.config import RealStudy
 
-FIGURES = ("gel_force", "markers", "shading", "ball_size")
+FIGURES = ("gel_force", "markers", "shading", "ball_size", "circles")
 
 
 def jobs(study: RealStudy, folder: str | Path) -> list[Job]:
@@ -89,12 +89,14 @@ class _Jobs:
                 work={"fits": 8 * len(others)}),
             *(Job("fit_shading", {"presses": f"{self.folder}/presses/{{set}}.npz".format(set=name)},
                   {"table": f"{self.folder}/shading/{{set}}.csv", "ball": f"{self.folder}/shading/{{set}}_ball.csv",
+                   "circles": f"{self.folder}/shading/{{set}}_circles.csv",
                    "shading": f"{self.folder}/shading/{{set}}.yaml", "examples": f"{self.folder}/shading/{{set}}_examples.npz"},
                   {"set": self.values.shading.sets[name].model_dump(mode="json"), "shading": shading, "name": name}, {"set": name},
                   {"splits": len(self.values.shading.seeds)}) for name in self.sets),
             Job("gather_tables", {"shading": [f"{self.folder}/shading/{name}.csv" for name in self.sets],
-                                  "ball": [f"{self.folder}/shading/{name}_ball.csv" for name in self.sets]},
-                {"shading": self.table("shading"), "ball_size": self.table("ball_size")}, {"sets": self.sets})]
+                                  "ball": [f"{self.folder}/shading/{name}_ball.csv" for name in self.sets],
+                                  "circles": [f"{self.folder}/shading/{name}_circles.csv" for name in self.sets]},
+                {name: self.table(name) for name in ("shading", "ball_size", "circles")}, {"sets": self.sets})]
 
     def figures(self) -> list[Job]:
         """All figures."""
@@ -105,11 +107,12 @@ class _Jobs:
                     {"gel_force": force.model_dump(mode="json")}),
                 Job("draw_markers", {"motion": self.table("marker_motion")}, figure_files(self.folder, "markers")),
                 Job("draw_shading", {"examples": examples}, figure_files(self.folder, "shading"), {"sets": self.sets}),
+                Job("draw_circles", {"table": self.table("circles")}, figure_files(self.folder, "circles")),
                 Job("draw_ball_size", {"table": self.table("ball_size")}, figure_files(self.folder, "ball_size"))]
 
     def ends(self) -> list[Job]:
         """Verdicts and the page."""
-        names = ["gel_force", "markers", "other_markers", "shading", "ball_size"]
+        names = ["gel_force", "markers", "other_markers", "shading", "ball_size", "circles"]
         tables = {name: self.table(name) for name in names}
         limits = {name: one.least_mae for name, one in self.values.shading.sets.items()}
         made = {name: one.source == "made" for name, one in self.values.shading.sets.items()}

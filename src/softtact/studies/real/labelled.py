@@ -1,6 +1,6 @@
 """Labelled presses of a set: splits, circles found again, colours by each model, and their scores in the contact."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from softtact.evaluation.image_scores import image_scores
 from softtact.files import read_arrays
 from softtact.imaging.ball_presses import BallPress, Gel, ball_slopes, refined_circle
+from softtact.imaging.ball_shadows import AROUND, press_dimming, with_lamps
 from softtact.imaging.shading import (
     PhongShading,
     QuadraticShading,
@@ -23,6 +24,8 @@ from softtact.imaging.shading import (
 REACH = 1.5             # contact radii: how far from the centre pixels are fitted
 WHEEL = "the wheel's table"
 SMALL = "quadratic in tilt"
+SHADOWS = "table with shadows"
+AROUND_SCORED = 3.0     # labelled radii: the end of the ring around the circle that is scored
 _PIXELS = 40_000        # samples of a fit, about
 _LARGEST = 0.985        # of a contact's radius over the ball's
 _BINS = 125             # of the wheel's table, along each axis
@@ -82,6 +85,14 @@ def fitted(kind: str, own: LabelledSet, presses: Sequence[BallPress], gel: Gel, 
     return shading.fit(samples, own.pixels, presses[0].background, **own_options)
 
 
+def with_shadows(shading: Shading, presses: Sequence[BallPress], gel: Gel, *, reach: Sequence[float]) -> Shading:
+    """The shading with lamps whose shadows explain what it leaves around the presses, if shadows explain anything.
+
+    reach: (press,) contact radii that are a labelled one
+    """
+    return replace(shading, lamps=with_lamps(shading, presses, gel, reach=[AROUND * one for one in reach]))
+
+
 def circles_found(own: LabelledSet, numbers: Sequence[int], gel: Gel, options: dict[str, Any], rounds: int,
                   ) -> tuple[list[BallPress], Shading]:
     """The presses with circles found from their colours, and the polynomial that they were found with.
@@ -118,7 +129,8 @@ def drawn(model: Shading | np.ndarray, press: BallPress, gel: Gel, x: np.ndarray
     slopes = ball_slopes(x - press.centre_px[0], y - press.centre_px[1], press.radius_px, gel)
     background = press.background[y, x]
     if isinstance(model, Shading):
-        return model.colours(slopes[..., 0], slopes[..., 1], x, y, background)
+        dimming = None if model.lamps is None else press_dimming(press, gel, model.lamps, x, y)
+        return model.colours(slopes[..., 0], slopes[..., 1], x, y, background, dimming)
     return np.clip(background + wheel_difference(model, slopes, x, y), 0, 255)
 
 
@@ -136,9 +148,22 @@ def wheel_difference(table: np.ndarray, slopes: np.ndarray, x: np.ndarray, y: np
 
 def scores(model: Shading | np.ndarray, press: BallPress, label: BallPress, gel: Gel) -> dict[str, float]:
     """MAE, MSE, SSIM, PSNR in the labelled circle, of a press drawn with the circle that it has."""
-    x, y = label.square(label.radius_px)
-    inside = np.hypot(x - label.centre_px[0], y - label.centre_px[1]) <= label.radius_px
-    found = image_scores(drawn(model, press, gel, x, y), label.image[y, x], counted=inside)
+    return scores_of(label, lambda x, y: drawn(model, press, gel, x, y), 0.0, 1.0)
+
+
+def scores_around(model: Shading, press: BallPress, label: BallPress, gel: Gel) -> dict[str, float]:
+    """The same in the ring around the labelled circle."""
+    found = scores_of(label, lambda x, y: drawn(model, press, gel, x, y), 1.0, AROUND_SCORED)
+    return {f"around_{name}": value for name, value in found.items()}
+
+
+def scores_of(label: BallPress, colours: Callable[[np.ndarray, np.ndarray], np.ndarray], inner: float, outer: float,
+              ) -> dict[str, float]:
+    """MAE, MSE, SSIM, PSNR of colours(columns, rows) between two distances from a labelled centre, in labelled radii."""
+    x, y = label.square(outer * label.radius_px)
+    distance = np.hypot(x - label.centre_px[0], y - label.centre_px[1])
+    inside = (distance >= inner * label.radius_px) & (distance <= outer * label.radius_px)
+    found = image_scores(colours(x, y), label.image[y, x], counted=inside)
     return {"mae": found.mae, "mse": found.mse, "ssim": found.ssim, "psnr_db": found.psnr}
 
 

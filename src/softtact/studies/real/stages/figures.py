@@ -93,6 +93,31 @@ def draw_shading(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
     save(figure, outputs["png"], outputs["svg"])
 
 
+def draw_circles(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Draw where the middle of each press is, from its label: by the shading, and by the image's oddness alone.
+
+    inputs: table (CSV);  outputs: png, svg
+    """
+    table = read_csv(inputs["table"])
+    sets = list(dict.fromkeys(table.set))
+    figure = pyplot().figure(figsize=(3.0 * len(sets), 3.2), layout="constrained")
+    for axes, name in zip(figure.subplots(1, len(sets), squeeze=False)[0], sets, strict=True):
+        own = table[table.set == name]
+        found, odd = (own[[f"{kind}_x_px", f"{kind}_y_px"]].to_numpy() - own[["label_x_px", "label_y_px"]].to_numpy()
+                      for kind in ("found", "odd"))
+        axes.plot(*np.stack([found, odd]).transpose(2, 0, 1), "-", color="0.8", lw=0.8)
+        axes.plot(*found.T, "o", ms=4, color=_COLOURS[0], label="found by the shading")
+        axes.plot(*odd.T, "x", ms=4, color=_COLOURS[1], label="the image is most odd")
+        axes.plot(0, 0, "k+", ms=12, label="label")
+        axes.set_title(name.replace("_", " "), fontsize=9)
+        axes.set_xlabel("column - label (px)")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.invert_yaxis()
+    figure.axes[0].set_ylabel("row - label (px)")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    save(figure, outputs["png"], outputs["svg"])
+
+
 def draw_ball_size(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw the error of the colours over the ball's assumed radius.  inputs: table;  outputs: png, svg"""
     table = read_csv(inputs["table"])

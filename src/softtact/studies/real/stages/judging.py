@@ -16,7 +16,13 @@ _CAPTIONS = {
                "found from the colours.",
     "ball_size": "Error of the colours over the assumed radius of the ball: presses held out, in and around the contact; the "
                  "wheel's table, which has seen all presses, in the contact.",
+    "circles": "The middle of each press from its label: where the shading finds it, and where the image minus the untouched gel "
+               "is most odd, for which no shading and no ball is assumed. Where both agree and lie off the label, the label is off.",
 }
+
+
+_SCORES = ("mae", "mse", "ssim", "psnr_db", "around_mae", "around_mse", "around_ssim", "around_psnr_db", "normal_deg",
+           "normal_median_deg")
 
 
 def judge(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -54,12 +60,24 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
         page.table(tables["other_markers"], "Markers, other images", file=inputs["other_markers"])
     page.table(mean_scores(tables["shading"]), "Shading, mean over held-out presses", file=inputs["shading"])
     page.table(tables["ball_size"].drop_duplicates(["set", "model"]), "Size of the ball", file=inputs["ball_size"])
+    page.table(circles_summary(tables["circles"]), "Labelled circles, medians over presses", file=inputs["circles"])
     page.section("Configuration")
     page.code(settings["config"])
     page.write(outputs["page"])
 
 
 def mean_scores(table: pd.DataFrame) -> pd.DataFrame:
-    """A row for each set, kind of circles and model: means over presses and seeds."""
-    names = ["mae", "mse", "ssim", "psnr_db", "normal_deg", "normal_median_deg"]
-    return table.groupby(["set", "circles", "model"], sort=False)[names].mean().reset_index()
+    """A row for each set, kind of circles and model: means over seeds of the means over presses, and the scatter over seeds."""
+    names = [name for name in _SCORES if name in table]
+    keys = ["set", "circles", "model"]
+    seeds = table.groupby([*keys, "seed"], sort=False)[names].mean()
+    over = seeds.groupby(keys, sort=False)
+    spread = over[["mae"]].std(ddof=1).rename(columns={"mae": "mae_sd_of_seeds"})
+    return pd.concat([over[names].mean(), spread, over.size().rename("seeds")], axis=1).reset_index()
+
+
+def circles_summary(table: pd.DataFrame) -> pd.DataFrame:
+    """A row for each set: medians of distances between labelled, found and odd middles, and of the radii's ratio, in px."""
+    own = table.assign(found_over_label_radius=table.found_radius_px / table.label_radius_px)
+    names = ["found_minus_label_px", "odd_minus_label_px", "odd_minus_found_px", "found_over_label_radius", "label_radius_px"]
+    return own.groupby("set", sort=False)[names].median().reset_index()

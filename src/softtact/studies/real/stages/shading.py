@@ -5,12 +5,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.image_scores import image_scores
+from softtact.calibration.camera import odd_middle
 from softtact.files import atomic_path, read_csv, write_csv
 from softtact.imaging.ball_presses import Gel
 from softtact.progress import Watch
 from softtact.studies.real.labelled import (
     REACH,
+    SHADOWS,
     SMALL,
     WHEEL,
     LabelledSet,
@@ -23,7 +24,10 @@ from softtact.studies.real.labelled import (
     per_press_mae,
     read_set,
     scores,
+    scores_around,
+    scores_of,
     split,
+    with_shadows,
 )
 
 GIVEN, FOUND = "labelled", "found"
@@ -34,7 +38,7 @@ _DRAWS = 400            # of the presses, for the interval of the ball's size
 def fit_shading(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Fit and judge the shading of one set.
 
-    inputs: presses (npz);  outputs: table, ball (CSV), shading (YAML), examples (npz);  settings: set, shading, name
+    inputs: presses (npz);  outputs: table, ball, circles (CSV), shading (YAML), examples (npz);  settings: set, shading, name
     """
     values, one = settings["shading"], settings["set"]
     own = read_set(inputs["presses"], Gel(one["ball_px"], one["thickness_px"]))
@@ -50,7 +54,10 @@ def fit_shading(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     with atomic_path(outputs["examples"]) as temporary:
         np.savez_compressed(temporary, **examples)     # type: ignore[arg-type]
     every, _ = circles_found(own, range(len(own.presses)), own.gel, options, values["rounds"])
-    shading = fitted("table", own, every, own.gel, options, reach=_reach(own, every, range(len(own.presses))))
+    write_csv(outputs["circles"], _circles(own, every).assign(set=settings["name"]))
+    reach = _reach(own, every, range(len(own.presses)))
+    shading = fitted("table", own, every, own.gel, options, reach=[REACH * one for one in reach])
+    shading = with_shadows(shading, every, own.gel, reach=reach)
     provenance = {"fitted": True, "presses": len(own.presses), "circles": "found from the colours", "ball_px": one["ball_px"],
                   "thickness_px": one["thickness_px"], "source": one["source"] + (f" {one['name']}" if one["name"] else "")}
     type(shading)(**{**vars(shading), "provenance": provenance}).save(outputs["shading"])
@@ -58,14 +65,16 @@ def fit_shading(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
 
 def gather_tables(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Join the tables of all sets.  inputs: shading, ball (lists of CSV);  outputs: shading, ball_size (CSV);  settings: sets"""
-    for name, output in (("shading", "shading"), ("ball", "ball_size")):
+    """Join the tables of all sets.  inputs: shading, ball, circles (lists of CSV);  outputs: shading, ball_size, circles (CSV);
+    settings: sets
+    """
+    for name, output in (("shading", "shading"), ("ball", "ball_size"), ("circles", "circles")):
         write_csv(outputs[output], pd.concat([read_csv(path) for path in inputs[name]], ignore_index=True))
 
 
 def _reach(own, presses, numbers):
-    """Contact radii that are REACH labelled ones."""
-    return [REACH * clipped(own.presses[number], own.gel).radius_px / press.radius_px
+    """Contact radii that are a labelled one."""
+    return [clipped(own.presses[number], own.gel).radius_px / press.radius_px
             for number, press in zip(numbers, presses, strict=True)]
 
 
@@ -79,13 +88,16 @@ def _of_split(own, parts, options, rounds, seed):
     rows, examples = [], {}
     for circles, fitting, held_out, reach in ((GIVEN, given, labels, [1.0] * len(given)),
                                               (FOUND, found, again, _reach(own, found, fit))):
-        models: dict[str, Any] = {kind: fitted(kind, own, fitting, own.gel, options, reach=reach) for kind in KINDS}
+        far = [(REACH if circles == FOUND else 1.0) * one for one in reach]
+        models: dict[str, Any] = {kind: fitted(kind, own, fitting, own.gel, options, reach=far) for kind in KINDS}
+        models |= {SHADOWS: with_shadows(models["table"], fitting, own.gel, reach=reach)}
         models |= {WHEEL: own.wheel} if own.wheel is not None else {}
         for name, model in models.items():
             for number, press, label in zip(held, held_out, labels, strict=True):
-                angle = normal_errors(model, press, own.gel) if name != WHEEL else np.array([np.nan])
+                angle = normal_errors(model, press, own.gel) if name not in (WHEEL, SHADOWS) else np.array([np.nan])
+                around = scores_around(model, press, label, own.gel) if name in ("table", SHADOWS) else {}
                 rows.append({"circles": circles, "model": name, "seed": seed, "press": number,
-                             **scores(model, press, label, own.gel), "normal_deg": float(np.mean(angle)),
+                             **scores(model, press, label, own.gel), **around, "normal_deg": float(np.mean(angle)),
                              "normal_median_deg": float(np.median(angle))})
         rows += [{"circles": circles, "model": "background alone", "seed": seed, "press": number, **_background(label)}
                  for number, label in zip(held, labels, strict=True)]
@@ -96,10 +108,21 @@ def _of_split(own, parts, options, rounds, seed):
 
 def _background(label):
     """Scores of the untouched gel."""
-    x, y = label.square(label.radius_px)
-    inside = np.hypot(x - label.centre_px[0], y - label.centre_px[1]) <= label.radius_px
-    found = image_scores(label.background[y, x], label.image[y, x], counted=inside)
-    return {"mae": found.mae, "mse": found.mse, "ssim": found.ssim, "psnr_db": found.psnr}
+    return scores_of(label, lambda x, y: label.background[y, x], 0.0, 1.0)
+
+
+def _circles(own, found):
+    """Of each press the labelled circle, that found by the shading, and the middle about which the image is most odd."""
+    rows = []
+    for label, press in zip(own.presses, found, strict=True):
+        middle = odd_middle(label.difference, near_px=label.centre_px, within_px=label.radius_px)
+        rows.append({"press": int(label.name), "label_x_px": label.centre_px[0], "label_y_px": label.centre_px[1],
+                     "label_radius_px": label.radius_px, "found_x_px": press.centre_px[0], "found_y_px": press.centre_px[1],
+                     "found_radius_px": press.radius_px, "odd_x_px": middle[0], "odd_y_px": middle[1],
+                     "found_minus_label_px": float(np.hypot(*np.subtract(press.centre_px, label.centre_px))),
+                     "odd_minus_label_px": float(np.hypot(*np.subtract(middle, label.centre_px))),
+                     "odd_minus_found_px": float(np.hypot(*np.subtract(middle, press.centre_px)))})
+    return pd.DataFrame(rows)
 
 
 def _examples(own, models, press, label):
