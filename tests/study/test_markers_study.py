@@ -20,6 +20,7 @@ from softtact.studies.markers import paths
 from softtact.studies.markers.claims import claims_of_markers
 from softtact.studies.markers.config import load_study, read_values
 from softtact.studies.markers.drag import DragSequence, drag_fragment
+from softtact.studies.markers.jobs import jobs
 from softtact.studies.markers.judging import sliding_verdicts, wrong_objects
 from softtact.studies.markers.pressing import reduced, sequence_file
 from softtact.studies.markers.scoring import (
@@ -237,6 +238,7 @@ def test_tables_have_means_over_seeds_with_their_spread():
     rows.loc[rows.source == "no_motion", ["mae", "mse", "ssim", "psnr"]] = np.nan
     one = table_one(rows, ["no_motion", "proposed", "absent"]).set_index("source")
     assert one.loc["proposed", ["d_px", "d_px_sd"]].tolist() == pytest.approx([5.0, np.sqrt(50)])
+    assert one.loc["proposed", "d_px_each"] == "0, 10"
     assert list(one.index) == ["no_motion", "proposed"]
     assert table_two(rows, ["no_motion", "proposed"]).source.tolist() == ["proposed"]
 
@@ -303,6 +305,22 @@ def test_a_depth_between_two_steps_is_refused(study_file):
     values = read_values(study_file)
     values["share"] = values["share"] | {"test_depths_mm": [0.3]}
     with pytest.raises(InputError, match=r"a depth of 0.3 mm is not among steps of 0.25 mm to 0.5 mm; give a multiple"):
+        load_study(values, study_file)
+
+
+@pytest.mark.parametrize(("seeds", "trained"), [(2, [0, 1]), ([7, 3], [7, 3])])
+def test_networks_are_trained_from_each_seed(study_file, seeds, trained):
+    values = read_values(study_file)
+    values["networks"] = values["networks"] | {"seeds": seeds}
+    made = jobs(load_study(values, study_file), "results")
+    for stage in ("train_network", "score_network"):
+        assert [job.settings["seed"] for job in made if job.stage == stage and job.settings["network"] == "proposed"] == trained
+
+
+def test_a_seed_named_twice_is_refused(study_file):
+    values = read_values(study_file)
+    values["networks"] = values["networks"] | {"seeds": [1, 1]}
+    with pytest.raises(InputError, match="networks.*names a seed twice"):
         load_study(values, study_file)
 
 

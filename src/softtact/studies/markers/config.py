@@ -62,14 +62,26 @@ class ShareKeys(Section):
     held_out: _Count = Field(15, description="poses that are drawn for tests, of each object of objects.train")
 
 
+def _numbered(value: Any) -> Any:
+    """A number of seeds as the seeds from 0 on; all else as it is."""
+    return list(range(value)) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class NetworkKeys(Section):
     """The networks that are compared."""
 
     size: Literal["reduced", "printed"] = Field(description="reduced: 64 pixels, 2.1 million weights; printed: 256, 58.6 million")
     names: Annotated[list[Literal[tuple(NETWORKS)]], Field(min_length=1)]  # type: ignore[valid-type]
-    seeds: PositiveInt = Field(description="trainings of each network; 5 in the paper")
+    seeds: Annotated[list[_Count], BeforeValidator(_numbered), Field(min_length=1)] = Field(
+        description="of the trainings of each network, or how many from 0 on; 5 in the paper")
     training: ImageTraining = ImageTraining()
     device: str = Field("auto", description="cpu, cuda, cuda:1 or auto")
+
+    @model_validator(mode="after")
+    def _seeds_differ(self):
+        if len(set(self.seeds)) < len(self.seeds):
+            raise ValueError(f"seeds is {self.seeds}, which names a seed twice; name each once")
+        return self
 
 
 class SlidingKeys(Section):

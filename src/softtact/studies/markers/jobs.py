@@ -42,7 +42,7 @@ class _Jobs:
         }
         self.parts = list(self._parts())
         self.sequences = [f"{folder}/dataset/{part}.nc" for part, _ in self.parts]
-        self.trainings = [(name, seed) for name in self.values.networks.names for seed in range(self.values.networks.seeds)]
+        self.trainings = [(name, seed) for name in self.values.networks.names for seed in self.values.networks.seeds]
         self.sources = ["no_motion", *self.values.baselines, *reversed(self.values.networks.names), "physics"]
 
     def _parts(self):

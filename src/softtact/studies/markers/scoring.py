@@ -147,7 +147,8 @@ def _alike(made: Made, truth: Truth, number: int, camera: Camera) -> dict[str, f
 
 
 def table_one(rows: pd.DataFrame, sources: Sequence[str]) -> pd.DataFrame:
-    """Table I: a row for each source with d_px, e_px and degenerate_percent, each with its standard deviation over the seeds.
+    """Table I: a row for each source with d_px, e_px and degenerate_percent, each with its standard deviation over the seeds,
+    and the values of the seeds.
 
     d and e are means over the frames that are not degenerate.
     """
@@ -175,6 +176,7 @@ def _summary(rows: pd.DataFrame, sources: Sequence[str], names: Sequence[str]) -
                 "seeds": len(one),
                 **{name: one[name].mean() for name in names},
                 **{f"{name}_sd": spread[name] for name in names},
+                **{f"{name}_each": ", ".join(f"{value:.3g}" for value in one[name]) if len(one) > 1 else np.nan for name in names},
             }
         )
     return pd.DataFrame(found)

@@ -110,7 +110,7 @@ def _labels(name, own, made):
     off = both < 0.5 * min(label, odd)
     return row(f"The labelled circles of {name} lie where the images show them", "shading", "not stated",
                MADE if made else f"found to label {label:.1f} px, most odd to label {odd:.1f} px, most odd to found {both:.1f} px",
-               UNDECIDED if made else verdict_of(not off), "not so where middles found by the shading and by oddness lie less than half "
+               UNDECIDED if made else verdict_of(not off), "not so where the two middles that are found lie less than half "
                "as far from each other as each from the label; medians", "tables/circles.csv", uncertainty=f"{len(own)} presses")
 
 

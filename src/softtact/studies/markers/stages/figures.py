@@ -150,12 +150,14 @@ def draw_training(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     """The losses of all trainings.  inputs: histories (list of CSV)."""
     plt = pyplot()
     figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
+    named = set[str]()
     for file in inputs["histories"]:
         one = read_csv(file)
         name = str(one.network.iloc[0])
         for place, column in zip(axes, ("l1", "adversarial", "discriminator"), strict=True):
-            place.plot(one.epoch, one[column], color=COLOURS[name], label=WORDS[name] if one.seed.iloc[0] == 0 else None)
+            place.plot(one.epoch, one[column], color=COLOURS[name], label=None if name in named else WORDS[name])
             place.set(xlabel="epoch", title={"l1": "mean absolute error of pixels (-1 to 1)"}.get(column, f"{column} loss"))
+        named.add(name)
     axes[0].set_ylim(bottom=0)
     handles = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))
     axes[0].legend(handles.values(), handles.keys(), frameon=False, fontsize=7)

@@ -127,7 +127,8 @@ def _worded(table: pd.DataFrame) -> pd.DataFrame:
     """A table with sources and columns in words; a column without any number, such as a spread over one seed, is left out."""
     heads: dict[str, str] = {}
     for name, head in _HEADS.items():
-        heads |= {name: head, f"{name}_sd": f"{head}, sd over seeds", f"printed_{name}": f"printed: {head}"}
+        heads |= {name: head, f"{name}_sd": f"{head}, sd over seeds", f"{name}_each": f"{head}, each seed",
+                  f"printed_{name}": f"printed: {head}"}
     if "source" in table:
         table = table.assign(source=table.source.map(lambda name: WORDS.get(name, name)))
     return table.dropna(axis=1, how="all").rename(columns=heads | {"source": "images or markers of"})

@@ -17,7 +17,7 @@ _CAPTIONS = {
     "ball_size": "Error of the colours over the assumed radius of the ball: presses held out, in and around the contact; the "
                  "wheel's table, which has seen all presses, in the contact.",
     "circles": "The middle of each press from its label: where the shading finds it, and where the image minus the untouched gel "
-               "is most odd, for which no shading and no ball is assumed. Where both agree and lie off the label, the label is off.",
+               "is most odd, for which no shading and no ball is assumed. Where both agree and the label does not, it is off.",
 }
 
 
