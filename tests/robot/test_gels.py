@@ -48,7 +48,7 @@ def test_a_gel_carries_the_weight_of_what_it_holds(gel):
     env.reset(seed=1, options=STILL)
     plan = [(-0.6, 0.0)] * 30 + [(-0.6, 0.2)] * 20 + [(-0.6, 0.0)] * 10
     held = [env.step(np.array([grip, lift, 0.0]))[0] for grip, lift in plan][-1]
-    touches = env.unwrapped._readings._touches
+    touches = env.unwrapped.readings._touches
     assert sum(abs(carried(touch)[1]) for touch in touches.values()) == pytest.approx(0.4 * 9.81, rel=0.05)     # y is upright
     for finger, touch in touches.items():
         force, bound = held["force_n"][finger], 0.8 * -held["force_n"][finger, 2]     # 0.8: the scene's friction
@@ -58,7 +58,7 @@ def test_a_gel_carries_the_weight_of_what_it_holds(gel):
 
 def test_a_gel_over_which_an_object_slides_carries_most_of_what_friction_does(grasp):
     env, _, _, slid = grasp
-    for finger, touch in env.unwrapped._readings._touches.items():
+    for finger, touch in env.unwrapped.readings._touches.items():
         force, bound = slid["force_n"][finger], 0.8 * -slid["force_n"][finger, 2]
         assert carried(touch)[2] == pytest.approx(force[2], rel=1e-4)
         assert 0.7 * bound < np.linalg.norm(carried(touch)[:2]) <= bound * (1 + 1e-6)
@@ -67,7 +67,7 @@ def test_a_gel_over_which_an_object_slides_carries_most_of_what_friction_does(gr
 
 def test_a_gel_is_pressed_where_the_object_has_slid_to(grasp):
     env, _, held, slid = grasp
-    touch = env.unwrapped._readings._touches[0]
+    touch = env.unwrapped.readings._touches[0]
     normal, (x, y) = touch.mover._state.normal, touch.mover.points
     middle = np.array([x[normal > 0].mean(), y[normal > 0].mean()])
     assert slid["object_pose"][0] - held["object_pose"][0] > 1.2

@@ -81,10 +81,10 @@ def test_an_object_slips_below_half_its_weight_over_friction_and_not_above(share
     run.approach()
     run.close()
     run.grip(share * needed)
-    before = object_poses(run.data)[0, 1]
+    before = object_poses(run.data)[0, 0, 1]
     run.let_go()
     run.wait(0.3)
-    slipped = before - object_poses(run.data)[0, 1]
+    slipped = before - object_poses(run.data)[0, 0, 1]
     assert (slipped < 0.05) if held else (slipped > 2.0)     # mm; free fall in that time is 441 mm
 
 

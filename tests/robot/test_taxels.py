@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from softtact.geometry.pose import Pose
 from softtact.press.sensor import load_sensor
 from softtact.robot.events import pose_of, set_down
-from softtact.robot.taxels import TaxelMemory
+from softtact.robot.taxels import TaxelMemory, _add_carried
 
 CYLINDER = trimesh.creation.cylinder(radius=8.0, height=20.0, sections=64)
 LARGEST_N = 30.0
@@ -64,6 +64,22 @@ def test_between_two_places_readings_hardly_jump():
     assert np.abs(np.diff(slide, n=2, axis=0)).max() < 0.04 * slide.max()
 
 
+def test_readings_of_many_hands_at_once_are_those_of_each_alone():
+    memory, asked = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N), list(places(4))
+    poses, forces = np.array([one[1] for one in asked]).reshape(2, 2, 7), np.zeros((2, 2, 3))
+    forces[..., 2] = -np.array([one[2] for one in asked]).reshape(2, 2)
+    seen, errors = memory.observe_many(poses, forces)
+    assert (seen["tactile"].reshape(4, 7, 4) == np.round([memory.counts(*one) for one in asked])).all()
+    assert (memory.observe(poses[1], forces[1])["tactile"] == seen["tactile"][1]).all() and (errors > 0).all()
+
+
+def test_the_expected_error_of_a_reading_is_that_of_its_press():
+    memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
+    _, errors = memory.observe_many(np.array([[[0.0, 0, 0, 1, 0, 0, 0]]]), np.array([[[0.0, 0.0, -10.0]]]))
+    exact = memory.sensor.press(CYLINDER, force_n=10.0, model="elastic", threads=1, label="")
+    assert errors[0, 0] == pytest.approx(exact.expected_error_mm[0], rel=0.02)
+
+
 def test_an_object_beside_the_sensor_is_not_felt():
     memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
     assert memory.counts(0, np.array([30.0, 0, 0, 1, 0, 0, 0]), 5.0).max() < 1e-9
@@ -74,7 +90,8 @@ def test_a_map_that_is_carried_over_the_side_keeps_its_volume():
     memory = TaxelMemory(sensor, CYLINDER, "elastic", LARGEST_N)
     x, y = np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     pressed = np.exp(-((x - 8) ** 2 + (y + 5) ** 2) / 8)      # 3 mm from the side, to which it is moved by 1 mm
-    carried = memory._carried(pressed, np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), 1.0)
+    carried = np.zeros_like(pressed)
+    _add_carried(pressed[None], np.ones(1), *memory._carrying(np.zeros(3), np.array([1.0, 0.0, 0.0]), 1.0), 1.0, carried)
     assert carried.sum() == pytest.approx(pressed.sum(), rel=1e-9)
     _, column = np.unravel_index(carried.argmax(), carried.shape)
     assert sensor.spec.map_x_mm[column] == pytest.approx(9, abs=0.4)      # half a step of the map

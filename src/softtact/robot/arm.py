@@ -12,7 +12,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
 
@@ -57,24 +56,27 @@ _DAMPING, _ITERATIONS = 1e-3, 200
 _NEAR_M, _NEAR_RAD, _LARGEST_STEP = 1e-8, 1e-8, 0.3
 
 
-def inverse_kinematics(model: Any, position_m: np.ndarray, rotation: np.ndarray, *, start_rad: np.ndarray) -> np.ndarray:
+def inverse_kinematics(model: Any, position_m: np.ndarray, rotation: np.ndarray, *, start_rad: np.ndarray,
+                       data: Any = None) -> np.ndarray:
     """Joint angles (6,) in rad at which the site `grip` has a position (3,) in m and a rotation (3, 3) in the world.
 
     start_rad: (6,) where the iteration starts; it finds the solution nearby
+    data: a mujoco.MjData of the model to work in, whose state is lost, or None
     Raises InputError where the position is out of reach.
     """
-    data = mujoco.MjData(model)
+    data = mujoco.MjData(model) if data is None else data
     addresses = [model.joint(name).qposadr[0] for name in JOINTS]
     freedoms = [model.joint(name).dofadr[0] for name in JOINTS]
     site = model.site("grip").id
     angles = np.array(start_rad, dtype=float)
-    jacobian = np.zeros((6, model.nv))
+    jacobian, quaternion, turn = np.zeros((6, model.nv)), np.zeros(4), np.zeros(3)
     for _ in range(_ITERATIONS):
         data.qpos[addresses] = angles
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         offset = position_m - data.site_xpos[site]
-        turn = Rotation.from_matrix(rotation @ data.site_xmat[site].reshape(3, 3).T).as_rotvec()
+        mujoco.mju_mat2Quat(quaternion, (rotation @ data.site_xmat[site].reshape(3, 3).T).ravel())
+        mujoco.mju_quat2Vel(turn, quaternion, 1.0)
         if np.linalg.norm(offset) < _NEAR_M and np.linalg.norm(turn) < _NEAR_RAD:
             return (angles + np.pi) % (2 * np.pi) - np.pi
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)

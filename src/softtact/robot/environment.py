@@ -6,7 +6,8 @@
 Importing this module registers the environment.
 """
 
-from collections.abc import Mapping
+import copy
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,31 +72,44 @@ class GraspEnv(gymnasium.Env):
         self._mass_kg = None if mass_kg is None else mass_of(mass_kg)
         self._mesh = _mesh_of(mesh, unit)
         self.largest_force_n = number("largest_force_n", largest_force_n, unit="N")
-        place_step_mm = number("place_step_mm", place_step_mm, unit="mm")
-        self._readings: TaxelMemory | GelReadings
-        if has_gel(self._sensor):
-            self._readings = GelReadings(self._sensor, self._mesh, self._settings.friction, model, self.largest_force_n)
-        else:
-            self._readings = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n, place_step_mm)
+        self._model, self._place_step_mm = model, number("place_step_mm", place_step_mm, unit="mm")
+        self.readings = self._new_readings()
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({
-            **{name: _space_of(values) for name, values in self._readings.at_rest.items()},
+            **{name: _space_of(values) for name, values in self.readings.at_rest.items()},
             "force_n": gymnasium.spaces.Box(-np.inf, np.inf, (2, 3), np.float32),
             "object_pose": gymnasium.spaces.Box(-np.inf, np.inf, (7,), np.float32)})
         self._joints: np.ndarray | None = None
+
+    def _new_readings(self) -> TaxelMemory | GelReadings:
+        if has_gel(self._sensor):
+            return GelReadings(self._sensor, self._mesh, self._settings.friction, self._model, self.largest_force_n)
+        return TaxelMemory(self._sensor, self._mesh, self._model, self.largest_force_n, self._place_step_mm)
+
+    def beside(self) -> "GraspEnv":
+        """Another environment with the same options; both share object, sensor and the memory of taxels, not the gels."""
+        other = copy.copy(self)
+        other._np_random, other._np_random_seed, other._painter = None, None, Painter()
+        if isinstance(self.readings, GelReadings):
+            other.readings = self._new_readings()
+        return other
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
         """A new episode: the hand around the object, in a random placement.
 
         options: x_mm, y_mm, angle_deg, in place of random values
         """
+        self.begin(seed=seed, options=options)
+        return self._observe(), self._info()
+
+    def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+        """The beginning of an episode, as of `reset`, without an observation."""
         super().reset(seed=seed)
         drawn = {name: float(self.np_random.uniform(-side, side)) for name, side in _SPREAD.items()}
         self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, self._placement(drawn, options or {}),
                                   mass_kg=self._mass_kg)
         self._place_hand()
-        self._readings.begin()
-        return self._observe(), self._info()
+        self.readings.begin()
 
     def _placement(self, drawn, given):
         """The drawn placement with the values that are given; one beside the pads is refused."""
@@ -112,18 +126,22 @@ class GraspEnv(gymnasium.Env):
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Ten milliseconds of the scene."""
+        reward, ended = self.advance(action)
+        return self._observe(), reward, ended, False, self._info()
+
+    def advance(self, action: np.ndarray) -> tuple[float, bool]:
+        """The scene's part of a step: the reward, and whether the episode ends."""
         if not hasattr(self, "_scene"):
             raise InputError("step: there is no scene yet; call reset first.")
-        grip, lift, slide = np.clip(_three_numbers(action), -1.0, 1.0)
+        grip, lift, slide = np.clip(three_numbers(action), -1.0, 1.0)
         self._move_hand(lift, slide)
         self._move_fingers(0.5 * (grip + 1.0))
         before = self._risen_mm()
-        for _ in range(round(STEP_S / self._settings.time_step_s)):
-            mujoco.mj_step(self._scene.model, self._data)
+        mujoco.mj_step(self._scene.model, self._data, nstep=round(STEP_S / self._settings.time_step_s))
         mujoco.mj_forward(self._scene.model, self._data)
         risen = self._risen_mm()
         ended = risen < -_DROPPED_MM or risen > 0.98 * LIFT_MM
-        return self._observe(), float((risen - before) / LIFT_MM), bool(ended), False, self._info()
+        return float((risen - before) / LIFT_MM), bool(ended)
 
     def render(self) -> np.ndarray | None:
         """Image (480, 640, 3), uint8, of the hand and the object; None without a `render_mode`."""
@@ -138,7 +156,7 @@ class GraspEnv(gymnasium.Env):
         scene: Scene = self._scene
         if self._joints is None:
             self._joints = inverse_kinematics(scene.model, np.asarray(self._settings.grip_at_m), DOWN, start_rad=np.array(HOME_RAD))
-        self._data = start(scene)
+        self._data, self._scratch = start(scene), mujoco.MjData(scene.model)
         self._arm = [scene.model.actuator(name).id for name in JOINTS]
         self._fingers = [scene.model.actuator(f"finger_{finger}").id for finger in FINGERS]
         self._half_mm = self._open_mm = 0.5 * scene.width_mm + _BEGIN_MM
@@ -159,7 +177,7 @@ class GraspEnv(gymnasium.Env):
             self._hand_mm = wanted
             aside, up = wanted * MM
             place = np.asarray(self._settings.grip_at_m) + aside * DOWN[:, 1] + [0.0, 0.0, up]
-            self._aim = inverse_kinematics(self._scene.model, place, DOWN, start_rad=self._aim)
+            self._aim = inverse_kinematics(self._scene.model, place, DOWN, start_rad=self._aim, data=self._scratch)
         self._data.ctrl[self._arm] = self._aim
         if self._hand_mm[1] > _LETS_GO_MM:
             self._data.eq_active[self._scene.model.equality("fixture").id] = 0
@@ -179,15 +197,29 @@ class GraspEnv(gymnasium.Env):
         return float(self._data.body("object").xpos[2] / MM) - self._ground_mm
 
     def _observe(self):
-        forces, poses = pad_forces(self._scene.model, self._data), object_poses(self._data)
-        return {**self._readings.observe(poses, forces), "force_n": forces.astype(np.float32),
-                "object_pose": poses[0].astype(np.float32)}
+        poses, forces = loads_of([self])
+        return {**self.readings.observe(poses[0], forces[0]), **observed_loads(poses[0], forces[0])}
+
+    def scene_facts(self) -> dict[str, Any]:
+        """What `info` says of the scene."""
+        return {"risen_mm": self._risen_mm(), "opening_mm": self._scene.opening_mm(self._data)}
 
     def _info(self):
-        return {"risen_mm": self._risen_mm(), "opening_mm": self._scene.opening_mm(self._data), **self._readings.facts()}
+        return {**self.scene_facts(), **self.readings.facts()}
 
 
-def _three_numbers(action):
+def loads_of(environments: Sequence[GraspEnv]) -> tuple[np.ndarray, np.ndarray]:
+    """Poses (n, 2, 7) of the object in each sensor's frame, and its forces (n, 2, 3) in N on them."""
+    states = [one._data for one in environments]
+    return object_poses(*states), np.array([pad_forces(data.model, data) for data in states])
+
+
+def observed_loads(poses: np.ndarray, forces: np.ndarray) -> dict[str, np.ndarray]:
+    """The part of an observation that the scene gives, of poses (..., 2, 7) and forces (..., 2, 3)."""
+    return {"force_n": forces.astype(np.float32), "object_pose": poses[..., 0, :].astype(np.float32)}
+
+
+def three_numbers(action):
     """An action as three finite numbers."""
     try:
         values = np.asarray(action)
@@ -222,4 +254,5 @@ def _mesh_of(mesh, unit):
 
 
 if ENVIRONMENT not in gymnasium.registry:
-    gymnasium.register(ENVIRONMENT, entry_point="softtact.robot.environment:GraspEnv", max_episode_steps=400)
+    gymnasium.register(ENVIRONMENT, entry_point="softtact.robot.environment:GraspEnv", max_episode_steps=400,
+                       vector_entry_point="softtact.robot.vector_environment:GraspVectorEnv")

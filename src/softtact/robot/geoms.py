@@ -9,6 +9,7 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
@@ -85,10 +86,8 @@ def contacts_of(data: Any, geoms: Collection[int]) -> Iterator[tuple[int, int, i
 
     sign: of MuJoCo's force on the geom of `geoms`, as it acts on the second of a pair
     """
-    for number in range(data.ncon):
-        contact = data.contact[number]
-        first, second = (int(geom) for geom in contact.geom)
-        if contact.dist > 0 or (first in geoms) == (second in geoms):
+    for number, ((first, second), distance) in enumerate(zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True)):
+        if distance > 0 or (first in geoms) == (second in geoms):
             continue
         yield (number, second, first, 1.0) if second in geoms else (number, first, second, -1.0)
 
@@ -100,6 +99,7 @@ def contact_force(model: Any, data: Any, number: int, sign: float) -> np.ndarray
     return sign * data.contact[number].frame.reshape(3, 3).T @ wrench[:3]
 
 
-def pose_of_frame(position_m: np.ndarray, matrix: np.ndarray) -> tuple[np.ndarray, Rotation]:
-    """(position (3,) in mm, rotation) of a frame of MuJoCo, by its place in m and its matrix of nine numbers."""
-    return np.array(position_m) / MM, Rotation.from_matrix(np.reshape(matrix, (3, 3)))
+def pose_of_frame(position_m: ArrayLike, matrix: ArrayLike) -> tuple[np.ndarray, Rotation]:
+    """(positions (..., 3) in mm, rotations) of frames of MuJoCo, by their places in m and their matrices of nine numbers."""
+    matrices = np.asarray(matrix)
+    return np.array(position_m) / MM, Rotation.from_matrix(matrices.reshape(*matrices.shape[:-1], 3, 3))

@@ -162,22 +162,22 @@ def _is_steady(recent, force_n, share):
 
 def row_of(scene: Scene, data: Any) -> dict[str, Any]:
     """The row of a `GraspRecord` for one state, without the phase."""
-    sensors = [pose_of_frame(data.site(f"sensor_{finger}").xpos, data.site(f"sensor_{finger}").xmat) for finger in FINGERS]
+    sites = [data.site(f"sensor_{finger}") for finger in FINGERS]
+    at, turn = pose_of_frame([site.xpos for site in sites], [site.xmat for site in sites])
     return {"time_s": data.time, "joint_rad": [data.joint(name).qpos[0] for name in JOINTS],
-            "opening_mm": scene.opening_mm(data), "sensor_pose_world": [_seven(*sensor) for sensor in sensors],
-            "object_pose_sensor": object_poses(data), "force_n": pad_forces(scene.model, data),
+            "opening_mm": scene.opening_mm(data), "sensor_pose_world": np.column_stack([at, quaternion(turn)]),
+            "object_pose_sensor": object_poses(data)[0], "force_n": pad_forces(scene.model, data),
             "contact": contacts(scene.model, data)}
 
 
-def object_poses(data: Any) -> np.ndarray:
-    """(finger, 7): the object's mesh in each sensor's frame, in mm with the quaternion w, x, y, z."""
-    body = data.body("object")
-    at, turn = pose_of_frame(body.xpos, body.xmat)
-    poses = []
-    for finger in FINGERS:
-        origin, rotation = pose_of_frame(data.site(f"sensor_{finger}").xpos, data.site(f"sensor_{finger}").xmat)
-        poses.append(_seven(rotation.inv().apply(at - origin), rotation.inv() * turn))
-    return np.array(poses)
+def object_poses(*states: Any) -> np.ndarray:
+    """(state, finger, 7) of some mujoco.MjData: the object's mesh in each sensor's frame, in mm with the quaternion w, x, y, z."""
+    sites = [data.site(f"sensor_{finger}") for data in states for finger in FINGERS]
+    bodies = [data.body("object") for data in states for _ in FINGERS]
+    origin, sensor = pose_of_frame([site.xpos for site in sites], [site.xmat for site in sites])
+    at, turn = pose_of_frame([body.xpos for body in bodies], [body.xmat for body in bodies])
+    back = sensor.inv()
+    return np.column_stack([back.apply(at - origin), quaternion(back * turn)]).reshape(len(states), len(FINGERS), 7)
 
 
 def pad_forces(model: Any, data: Any) -> np.ndarray:
@@ -199,7 +199,3 @@ def contacts(model: Any, data: Any) -> np.ndarray:
 
 def _pads(model):
     return [model.geom(f"pad_{finger}").id for finger in FINGERS]
-
-
-def _seven(position_mm, rotation):
-    return np.concatenate([position_mm, quaternion(rotation)])

@@ -111,9 +111,10 @@ def to_mjcf(spec: "AnySpec", settings: SceneSettings) -> str:
 
 
 def quaternion(rotation: Rotation) -> np.ndarray:
-    """(4,) w, x, y, z, the largest positive, so the sign does not change from row to row at half a turn."""
+    """(..., 4) w, x, y, z, the largest positive, so the sign does not change from row to row at half a turn."""
     values = np.asarray(rotation.as_quat(scalar_first=True))
-    return values * np.sign(values[np.abs(values).argmax()])
+    largest = np.take_along_axis(values, np.abs(values).argmax(axis=-1)[..., None], axis=-1)
+    return values * np.sign(largest)
 
 
 def _user_robot(settings):

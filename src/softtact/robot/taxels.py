@@ -10,22 +10,25 @@ beside the object are interpolated. `benchmarks/environment.py` measures the err
 Readings do not depend on earlier calls. Tilt is left out: a held object's tilt follows from MuJoCo's contacts, not from the rubber.
 """
 
+import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import trimesh
-from scipy.ndimage import affine_transform
 from scipy.spatial.transform import Rotation
 
+from softtact.compiled import compiled
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.linalg.workers import one_thread_each
-from softtact.press.fast import thinning_maps
+from softtact.linalg.workers import Workers, one_thread_each
+from softtact.press.choice import ELASTIC_RELATIVE, rms, with_expected_error
+from softtact.press.fast import press_underside, thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.sensor import Sensor
+from softtact.press.task import cores
 from softtact.readout.taxels import counts_of
 from softtact.robot.events import FINGERS, set_down
 
@@ -35,9 +38,15 @@ _SENSE = (1.0, -1.0)
 _FORCES = 5              # of the ladder
 STEP_MM = 2.0            # of the grid of places: as exact in the elastic model as 1 mm
 _STEP_DEG = 2.0          # of the grid of rotations, which hardly change while a hand slides
-_SURFACES = 8            # most cached undersides: some MB each for a fine mesh
 _AT_PLACE = 0.02         # of a step along x: nearer to a place, its map is taken alone
 _MOST = 2.0              # largest factor of a moved map; beyond it the object is hardly over the sensor
+
+
+@dataclass(frozen=True)
+class _Place(Ladder):
+    """The ladder of a place, with the expected errors (l,) of its maps over their root mean squares."""
+
+    relative_error: np.ndarray
 
 
 @dataclass
@@ -45,7 +54,7 @@ class TaxelMemory:
     """Counts of both sensors under one object.
 
     model: elastic or foundation;  largest_force_n: limit of the forces
-    step_mm: of the grid of places along x and y
+    step_mm: of the grid of places along x and y;  surfaces: number of undersides that are kept, some MB each for a fine mesh
     """
 
     sensor: Sensor
@@ -53,6 +62,8 @@ class TaxelMemory:
     model: str
     largest_force_n: float
     step_mm: float = STEP_MM
+    surfaces: int = 8
+    _warned: bool = False
     _ladders: dict = field(default_factory=dict)
     _surfaces: dict = field(default_factory=dict)
 
@@ -63,6 +74,8 @@ class TaxelMemory:
             raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
                              f"{side:g}.")
         self.forces_n = even_in_root(self.sensor.checked_forces(self.largest_force_n)[0], _FORCES)
+        self._blank = Ladder(self.forces_n, np.empty(0))
+        self._errors_mm = np.zeros(len(FINGERS))
         self._step = np.array([self.step_mm, self.step_mm, _STEP_DEG])
         spec = self.sensor.spec
         self._first_mm = np.array([spec.map_y_mm[0], spec.map_x_mm[0]])     # as maps are indexed: y, x
@@ -79,12 +92,23 @@ class TaxelMemory:
 
     def observe(self, poses: np.ndarray, forces: np.ndarray) -> dict[str, np.ndarray]:
         """{tactile: (finger, row, column)} of both sensors under an object at poses (finger, 7) with forces (finger, 3) in N."""
-        counts = [self.counts(finger, poses[finger], -forces[finger, 2]) for finger in range(len(FINGERS))]
-        return {"tactile": np.round(counts).astype(np.uint16)}
+        seen, errors = self.observe_many(poses[None], forces[None])
+        self._errors_mm = errors[0]
+        return {name: values[0] for name, values in seen.items()}
+
+    def observe_many(self, poses: np.ndarray, forces: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """{tactile: (n, finger, row, column)} and expected errors of the maps (n, finger) in mm of n pairs of sensors at once.
+
+        poses (n, finger, 7), forces (n, finger, 3): as of `observe`, whose readings are the same
+        """
+        count, fingers = forces.shape[:2]
+        counts, errors = self._read(np.tile(np.arange(fingers), count), poses.reshape(-1, 7), -forces[..., 2].ravel())
+        shape = count, fingers
+        return {"tactile": np.round(counts).astype(np.uint16).reshape(*shape, *counts.shape[1:])}, errors.reshape(shape)
 
     def facts(self) -> dict[str, Any]:
-        """What an environment tells beside the readings."""
-        return {"places_pressed": self.places}
+        """What an environment tells beside the readings: expected errors (finger,) of the last maps in mm, number of places."""
+        return {"places_pressed": self.places, "expected_error_mm": self._errors_mm}
 
     @property
     def places(self) -> int:
@@ -93,21 +117,29 @@ class TaxelMemory:
 
     def counts(self, finger: int, pose: np.ndarray, force_n: float) -> np.ndarray:
         """(row, column) of a finger, 0 left or 1 right, under an object at a pose (7,) and a normal force (N) up to the largest."""
-        if force_n <= 0:
-            return counts_of(self.sensor.spec, np.zeros(self.sensor.spec.map_shape))
-        at = self._place(finger, pose)
-        carried: Any = 0.0
-        for number, share in self._beside(at):
-            ladder = self._ladder(finger, number)
-            pressed = np.tensordot(ladder.weights(np.array([force_n]))[0], ladder.maps_mm, 1)
-            carried = carried + share * self._carried(pressed, number * self._step, at, _SENSE[finger])
-        return counts_of(self.sensor.spec, carried)
+        return self._read(np.array([finger]), pose[None], np.array([force_n]))[0][0]
+
+    def _read(self, fingers, poses, forces):
+        """Counts (k, row, column) and expected errors (k,) in mm of fingers (k,) under objects at poses (k, 7) with forces (k,)."""
+        at, weights = self._places(fingers, poses), self._blank.weights(np.maximum(forces, 0.0))
+        parts = [(row, number, share) for row in np.flatnonzero(forces > 0) for number, share in self._beside(at[row])]
+        keys = [_key(fingers[row], number) for row, number, _ in parts]
+        self._press({*keys} - {*self._ladders})
+        carried, relative = np.zeros((len(forces), *self.sensor.spec.map_shape)), np.zeros(len(forces))
+        levels = np.minimum(np.searchsorted(self.forces_n, forces), _FORCES - 1)
+        for key, (row, number, share) in zip(keys, parts, strict=True):
+            ladder = self._ladders[key]
+            back, offset = self._carrying(number * self._step, at[row], _SENSE[fingers[row]])
+            _add_carried(ladder.maps_mm, weights[row], back, offset, share, carried[row])
+            relative[row] = max(relative[row], ladder.relative_error[levels[row]])
+        return counts_of(self.sensor.spec, carried), relative * rms(carried)
 
     @staticmethod
-    def _place(finger, pose):
-        """x, y in mm and the rotation about z in degrees (3,) of a pose; the tilt is left out."""
-        seen = (_FACING[finger].inv() * Rotation.from_quat(pose[3:], scalar_first=True)).as_quat()
-        return np.array([*pose[:2], np.degrees(2 * np.arctan2(seen[2], seen[3]))])
+    def _places(fingers, poses):
+        """x, y in mm and the rotation about z in degrees (k, 3) of poses (k, 7); the tilt is left out."""
+        facing = Rotation.concatenate([_FACING[finger].inv() for finger in fingers])
+        seen = (facing * Rotation.from_quat(poses[:, 3:], scalar_first=True)).as_quat()
+        return np.column_stack([poses[:, :2], np.degrees(2 * np.arctan2(seen[:, 2], seen[:, 3]))])
 
     def _beside(self, at):
         """Numbers (3,) of the places on both sides along x, with their weights; one place where it is near."""
@@ -118,38 +150,87 @@ class TaxelMemory:
             return [(nearest, 1.0)]
         return [(nearest, 1 - abs(beyond)), (nearest + [np.sign(beyond).astype(int), 0, 0], abs(beyond))]
 
-    def _ladder(self, finger, number):
-        """The `Ladder` of a place by its numbers (3,), pressed at its first use."""
-        key = finger, *(int(one) for one in number[:2]), int(number[2]) % round(360 / _STEP_DEG)
-        if key not in self._ladders:
-            self._ladders[key] = self._pressed(*key)
-        return self._ladders[key]
-
-    def _pressed(self, finger, x, y, turn):
-        surface = self._surface(finger, turn).moved(np.array([x, y, 0]) * self.step_mm)
+    def _press(self, keys):
+        """Press places by their keys, as many at a time as there are cores."""
+        if not keys:
+            return
         self.sensor.prepared(self.model)
+        surfaces = {key: self._surface(key[0], key[3]).moved(np.array([key[1], key[2], 0]) * self.step_mm) for key in sorted(keys)}
+        workers = Workers(min(len(surfaces), cores()))
+        with one_thread_each(), warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            found = workers.map(self._pressed, surfaces.values())
+        workers.close()
+        if heard and not self._warned:     # one sentence an object: others say the same of other places
+            self._warned = True
+            warnings.warn(heard[0].message, stacklevel=2)
+        self._ladders.update(zip(surfaces, found, strict=True))
+
+    def _pressed(self, surface):
+        """The ladder of an underside in its place."""
         try:
-            with one_thread_each():
+            if self.model == "elastic":
                 maps = thinning_maps(self.sensor, surface, self.forces_n, model=self.model)
+                relative = np.full(_FORCES, ELASTIC_RELATIVE)
+            else:
+                result = with_expected_error(self.sensor, press_underside(self.sensor, surface, self.forces_n, model=self.model))
+                maps = result.deformation_map_mm
+                relative = result.expected_error_mm / np.maximum(rms(maps), np.finfo(float).tiny)
         except InputError:     # the object is beside this sensor
-            maps = np.zeros((_FORCES, *self.sensor.spec.map_shape))
-        return Ladder(self.forces_n, maps.astype(np.float32))
+            maps, relative = np.zeros((_FORCES, *self.sensor.spec.map_shape)), np.zeros(_FORCES)
+        unknown = np.isnan(self.sensor.spec.frustum_height_mm)     # errors were calibrated on sensors with frusta
+        return _Place(self.forces_n, maps.astype(np.float32), np.where(unknown, np.nan, relative))
 
     def _surface(self, finger, turn):
         """The underside of the object in the sensor's middle; those of the last few rotations are kept."""
         if (finger, turn) not in self._surfaces:
-            if len(self._surfaces) == _SURFACES:
+            if len(self._surfaces) >= self.surfaces:
                 self._surfaces.pop(next(iter(self._surfaces)))
             pose = Pose(np.zeros(3), _FACING[finger] * Rotation.from_euler("z", turn * _STEP_DEG, degrees=True))
             self._surfaces[finger, turn] = HeightField(place(self.mesh, pose=set_down(self.mesh, pose)))
         return self._surfaces[finger, turn]
 
-    def _carried(self, pressed, here, there, sense):
-        """A map (y, x) of an object in one place (x, y, rotation), moved to another one nearby."""
+    def _carrying(self, here, there, sense):
+        """Matrix (2, 2) and offset (2,) from a point of the map (y, x), for an object in one place (x, y, rotation), to where that
+        point was in another one nearby."""
         angle = sense * np.radians(here[2] - there[2])
         back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])     # of y, x, from there to here
         offset = back @ (self._first_mm - there[1::-1]) + here[1::-1] - self._first_mm
-        carried = affine_transform(pressed, back * self._pitch_mm / self._pitch_mm[:, None], offset / self._pitch_mm, order=1,
-                                   mode="nearest")
-        sunk, now = np.maximum(pressed, 0.0).sum(), np.maximum(carried, 0.0).sum()
-        return carried * min(sunk / now, _MOST) if now > 0 else carried
+        return back * self._pitch_mm / self._pitch_mm[:, None], offset / self._pitch_mm
+
+
+def _key(finger, number):
+    """Of a place by its numbers (3,), on one finger."""
+    return int(finger), int(number[0]), int(number[1]), int(number[2]) % round(360 / _STEP_DEG)
+
+
+@compiled
+def _add_carried(maps, weights, back, offset, share, out):
+    """Add to a map (y, x) the weighted sum of maps (l, y, x), moved by a matrix and an offset, to a share.
+
+    Bilinear; beyond the rim as at the rim. The factor keeps the volume by which the sensor sinks.
+    """
+    rows, columns = out.shape
+    pressed, carried = np.empty((rows, columns)), np.empty((rows, columns))
+    sunk, now = 0.0, 0.0
+    for y in range(rows):
+        for x in range(columns):
+            value = 0.0
+            for level in range(len(weights)):
+                value += weights[level] * maps[level, y, x]
+            pressed[y, x] = value
+            sunk += max(value, 0.0)
+    for y in range(rows):
+        for x in range(columns):
+            at_y = min(max(back[0, 0] * y + back[0, 1] * x + offset[0], 0.0), rows - 1.0)
+            at_x = min(max(back[1, 0] * y + back[1, 1] * x + offset[1], 0.0), columns - 1.0)
+            low_y, low_x = min(int(at_y), rows - 2), min(int(at_x), columns - 2)
+            v, u = at_y - low_y, at_x - low_x
+            value = ((1 - v) * ((1 - u) * pressed[low_y, low_x] + u * pressed[low_y, low_x + 1])
+                     + v * ((1 - u) * pressed[low_y + 1, low_x] + u * pressed[low_y + 1, low_x + 1]))
+            carried[y, x] = value
+            now += max(value, 0.0)
+    factor = share * (min(sunk / now, _MOST) if now > 0 else 1.0)
+    for y in range(rows):
+        for x in range(columns):
+            out[y, x] += factor * carried[y, x]
