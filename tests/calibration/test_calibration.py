@@ -256,3 +256,12 @@ def test_a_cover_s_thickness_comes_back_and_is_written(tmp_path):
     assert mine.cover.thickness_mm == pytest.approx(1.1 * sensor.spec.cover.thickness_mm, rel=0.01)
     assert mine.edge.held_below_mm - mine.cover.thickness_mm == pytest.approx(
         sensor.spec.edge.held_below_mm - sensor.spec.cover.thickness_mm, abs=1e-4)
+
+
+def test_the_jacobian_of_the_fit_is_the_difference_of_its_residuals(bench, experiments):
+    problem = Problem(bench.presses, experiments, ALL)
+    at, steps = problem.mean + 0.1 * problem.deviation, 1e-3 * problem.steps
+    found, here = problem.jacobian(at, steps), problem.residuals(at)
+    for column, moved, step in zip(found.T, at + np.diag(steps), steps, strict=True):
+        wanted = (problem.residuals(moved) - here) / step
+        assert np.linalg.norm(column - wanted) <= 1e-3 * np.linalg.norm(wanted)

@@ -129,7 +129,7 @@ def _descend(problem, start):
         return start
 
     def jacobian(vector):
-        return _differences(problem.residuals, vector, problem.steps, problem.bounds[1])
+        return problem.jacobian(vector, _steps(problem, vector))
 
     low, high = problem.bounds
     inside = np.clip(start, low + 1e-9, high - 1e-9)
@@ -137,16 +137,15 @@ def _descend(problem, start):
                          ftol=1e-6, max_nfev=30).x
 
 
-def _differences(function, vector, steps, highest):
-    """Forward differences (n, p) of a function (n,); backward ones at an upper bound."""
+def _steps(problem, vector):
+    """Steps (p,) of forward differences; backward ones at an upper bound."""
+    return np.where(vector + problem.steps < problem.bounds[1], problem.steps, -problem.steps)
+
+
+def _differences(function, vector, steps):
+    """Differences (n, p) of a function (n,) for steps (p,)."""
     here = function(vector)
-    columns = []
-    for k, step in enumerate(steps):
-        signed = step if vector[k] + step < highest[k] else -step
-        moved = vector.copy()
-        moved[k] += signed
-        columns.append((function(moved) - here) / signed)
-    return np.stack(columns, axis=1)
+    return np.stack([(function(moved) - here) / step for moved, step in zip(vector + np.diag(steps), steps, strict=True)], axis=1)
 
 
 def _result(problem, vector):
@@ -172,8 +171,8 @@ def sensitivities(problem: Problem, vector: np.ndarray, best: Linear, change: np
                   inverse: np.ndarray) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Names (q,) of all unknowns, derivatives (n, q) of the predicted counts over their noise, and the priors' deviations (q,)."""
     taxels = best.gain.size
-    fitted = _differences(lambda moved: (best.gain * np.concatenate(problem.changes(moved))).ravel(), vector, problem.steps,
-                          problem.bounds[1]) if len(vector) else np.zeros((change.size, 0))
+    fitted = _differences(lambda moved: (best.gain * np.concatenate(problem.changes(moved))).ravel(), vector,
+                          _steps(problem, vector)) if len(vector) else np.zeros((change.size, 0))
     at = np.tile(np.arange(taxels), len(change))
     each = (at[:, None] == np.arange(taxels)).astype(float)
     columns = [fitted, (best.gain * change).reshape(-1, 1), best.scale * change.reshape(-1, 1) * each, each]

@@ -18,6 +18,7 @@ from softtact.calibration.experiment import Experiment
 from softtact.calibration.ladder import COVERS, FRICTIONS, SOFTEST, Presses, friction_ladders, friction_weights, parabola
 from softtact.errors import InputError
 from softtact.press.ladder import Ladder
+from softtact.readout.capacitance_rates import relative_change_rates
 from softtact.readout.hysteresis import lagged
 from softtact.readout.taxels import relative_change
 from softtact.readout.virtual_sensor import taxel_capacitance
@@ -194,19 +195,17 @@ class Problem:
 
     def changes(self, vector: np.ndarray) -> list[np.ndarray]:
         """dC/C0 (b, row, column) of each experiment."""
-        shares, times = self.creep(vector)
-        scale, cover = np.exp(self.value(vector, "ln modulus", 0.0)), self.value(vector, "cover", 1.0)
-        friction = self.value(vector, "friction", 0.0)
-        return [self._change(k, (*shares, *times, scale, cover, friction, *self.place(vector, k)), shares, times)
-                for k in range(len(self.experiments))]
+        return [self._change(k, *self._arguments(vector, k)) for k in range(len(self.experiments))]
+
+    def _arguments(self, vector, k):
+        """The unknowns on which the maps of experiment k depend, for `_maps`."""
+        return (*map(tuple, self.creep(vector)), np.exp(self.value(vector, "ln modulus", 0.0)), self.value(vector, "cover", 1.0),
+                self.value(vector, "friction", 0.0), tuple(self.place(vector, k)))
 
     def changes_of(self, vector: np.ndarray, *, amplitude: float = 1.0, sheet_excess_mm: float = 0.0) -> list[np.ndarray]:
         """`changes` with the maps times `amplitude`, and a sheet thicker by `sheet_excess_mm` over all taxels."""
-        shares, times = self.creep(vector)
-        scale, cover = np.exp(self.value(vector, "ln modulus", 0.0)), self.value(vector, "cover", 1.0)
-        friction = self.value(vector, "friction", 0.0)
-        return [self.change_of(amplitude * self._maps(k, shares, times, scale, cover, friction, self.place(vector, k)),
-                               sheet_excess_mm=sheet_excess_mm) for k in range(len(self.experiments))]
+        return [self.change_of(amplitude * self._maps(k, *self._arguments(vector, k)), sheet_excess_mm=sheet_excess_mm)
+                for k in range(len(self.experiments))]
 
     def change_of(self, maps_mm: np.ndarray, *, sheet_excess_mm: float = 0.0) -> np.ndarray:
         """dC/C0 (..., row, column) under maps (..., y, x) in mm, with a sheet thicker by `sheet_excess_mm` over all taxels."""
@@ -215,17 +214,13 @@ class Problem:
                          for maps in (np.zeros(maps_mm.shape[-2:]), maps_mm))
         return pressed / rest - 1
 
-    def _change(self, k, key, shares, times):
+    def _change(self, k, *arguments):
         """dC/C0 of one experiment, cached while its unknowns stay the same."""
-        if key not in self._known[k]:
+        if arguments not in self._known[k]:
             if len(self._known[k]) > 2 * len(self.names) + 4:
                 self._known[k].clear()
-            scale, cover, friction, *place = key[len(shares) + len(times):]
-            self._known[k][key] = self._read(k, shares, times, scale, cover, friction, place)
-        return self._known[k][key]
-
-    def _read(self, k, shares, times, scale, cover, friction, place):
-        return relative_change(self.presses.sensor.spec, self._maps(k, shares, times, scale, cover, friction, place))
+            self._known[k][arguments] = relative_change(self.presses.sensor.spec, self._maps(k, *arguments))
+        return self._known[k][arguments]
 
     def _maps(self, k, shares, times, scale, cover, friction, place):
         """Maps (b, y, x) in mm of one experiment."""
@@ -268,8 +263,36 @@ class Problem:
 
     def residuals(self, vector: np.ndarray) -> np.ndarray:
         """All misfits over their standard deviations, with those to the priors."""
+        return self._residuals(np.concatenate(self.changes(vector)), vector)
+
+    def jacobian(self, vector: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Derivatives (n, p) of `residuals` by the unknowns, with steps (p,): of differences of maps and of gains and zeros.
+
+        In between is the readout, which costs most and is differentiated by its formulas.
+        """
+        here, change = self.residuals(vector), np.concatenate(self.changes(vector))
+        rates, columns = self._change_rates(vector, steps), []
+        for rate, step, moved in zip(rates, steps, vector + np.diag(steps), strict=True):
+            columns.append((self._residuals(change + step * rate, moved) - here) / step)
+        return np.stack(columns, axis=1)
+
+    def _change_rates(self, vector, steps):
+        """Rates (p, n, row, column) of dC/C0 of all experiments."""
+        spec, found = self.presses.sensor.spec, []
+        for k in range(len(self.experiments)):
+            here = self._arguments(vector, k)
+            maps = self._maps(k, *here)
+            moved = [self._arguments(one, k) for one in vector + np.diag(steps)]
+            depends = [number for number, one in enumerate(moved) if one != here]
+            by_maps = [(self._maps(k, *moved[number]) - maps) / steps[number] for number in depends]
+            rates = np.zeros((len(steps), len(maps), *self.experiments[k].counts.shape[1:]))
+            if depends:
+                rates[depends] = relative_change_rates(spec, maps, np.stack(by_maps))
+            found.append(rates)
+        return np.concatenate(found, axis=1)
+
+    def _residuals(self, change, vector):
         counts, inverse = self.stacked()
-        change = np.concatenate(self.changes(vector))
         best = self.linear(change)
         misfit = inverse * (counts - best.gain * change - best.zero)
         taxels = [(best.gain / best.scale - 1) / self.priors.gain, best.zero / self.priors.zero_counts]
