@@ -40,9 +40,10 @@ def crushing_forces_n(sensor: "Sensor", placed: Trimesh, largest_n: float) -> np
             raise _Crushed      # deeper load steps would take most of the time
 
     control = RunControl(label="", reached=Reached(end_if_crushed))
-    with warnings.catch_warnings(action="ignore"), contextlib.suppress(_Crushed, ConvergenceError):
-        press_on_foundation(sensor, placed, largest_n * np.linspace(0, 1, _LOAD_STEPS + 1)[1:], control)
-    found = control.reached.result()
+    with warnings.catch_warnings(action="ignore"):      # the press itself will warn
+        with contextlib.suppress(_Crushed, ConvergenceError):
+            press_on_foundation(sensor, placed, largest_n * np.linspace(0, 1, _LOAD_STEPS + 1)[1:], control)
+        found = control.reached.result()
     if found is None:
         return np.full(2, np.inf)
     depths = np.append(0.0, found.deformation_map_mm.max(axis=(1, 2))) / height

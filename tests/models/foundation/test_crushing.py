@@ -38,6 +38,13 @@ def test_no_force_is_told_above_the_largest_one(sensor, ball):
     assert between[0] == pytest.approx(may, rel=0.02) and np.isinf(between[1])
 
 
+def test_nothing_else_is_told_that_the_press_itself_will_tell(sensor):
+    """At 20 N the wall, longer than the pad, rests on the shell."""
+    wall = trimesh.creation.box((2.0, 20.0, 4.0)).apply_translation([0.0, 0.0, 2.0])
+    with warnings.catch_warnings(action="error"):
+        assert np.isfinite(crushing_forces_n(sensor, wall, 20.0)).all()
+
+
 def test_a_press_that_will_crush_frusta_is_told_before_its_first_load_step(sensor, ball):
     told = r"crushed, by more than 80% of their height, from 4\.\d N on, and surely from 6\.\d N on"
     with pytest.warns(CrushedWarning, match=told), pytest.raises(TimeLimitError):

@@ -1,0 +1,150 @@
+"""Contacts that nobody tuned for, on coro with the hyperelastic model: how many reach 20 N, or the force that crushes frusta?
+
+    python benchmarks/hard_contacts.py [--presses 100] [--set judged]     one press: --one NUMBER
+
+Plugs, walls, boxes and rods, hollow and thin, one to three of them at two heights, tilted by up to 45 degrees, anywhere over the
+sensor, its sides and corners included; draft mesh, load steps 5, 10 and 20 N, or up to the force from which frusta may be crushed.
+A press counts as reached within 360 seconds of the processor, three minutes of two cores, with each load step valid; one that is
+not has been told if it ended within 60 seconds, or was foretold. Work on the solver with the set `trial` alone: after its last
+change take a new SEED, so that nobody has seen the contacts on which it is judged. The run goes on from where the record ends;
+record: benchmarks/results/hard_contacts.json.
+"""
+
+import argparse
+import json
+import signal
+import time
+import warnings
+
+import numpy as np
+import record
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from softtact.errors import InputError, SofttactError
+from softtact.geometry.meshes import place
+from softtact.geometry.pose import Pose
+from softtact.models.hyperelastic.mesh_settings import MeshSettings, NewtonSettings
+from softtact.press.crushing import crushing_forces_n
+from softtact.press.sensor import load_sensor
+
+SEED = {"trial": 1, "judged": 20261128}
+FORCES_N = np.array([5.0, 10.0, 20.0])
+LARGEST_TILT = 45.0
+LIMIT_S, TOLD_S = 360.0, 60.0      # of the processor
+OUTCOMES = ("reached", "flagged", "stopped", "late", "refused", "crashed")
+
+
+def part(rng):
+    """One body in mm, tilted, its lowest point at the origin; its name, and its tilt in degrees."""
+    size, wall, height = rng.uniform(2.0, 8.0), rng.uniform(0.3, 1.0), 6.0
+    name = ("plug", "wall", "box", "rod")[rng.integers(4)]
+    body = {"plug": lambda: trimesh.creation.annulus(r_min=0.5 * size, r_max=0.5 * size + wall, height=height, sections=64),
+            "wall": lambda: trimesh.creation.box((wall, size, height)),
+            "box": lambda: trimesh.creation.box((size, rng.uniform(2.0, 8.0), height)),
+            "rod": lambda: trimesh.creation.cylinder(radius=0.25 * size, height=height, sections=64)}[name]()
+    tilt, about = rng.uniform(0, LARGEST_TILT), rng.uniform(0, 2 * np.pi)
+    turn = Rotation.from_rotvec(np.radians(tilt) * np.array([np.cos(about), np.sin(about), 0.0]))
+    body.vertices = turn.apply(body.vertices)
+    return body.apply_translation(-body.vertices[body.vertices[:, 2].argmin()]), name, round(float(tilt), 1)
+
+
+def contact(seed, number, spec):
+    """The mesh of a contact, its pose, and names and tilts of its bodies: beside each other, every second one higher."""
+    rng = np.random.default_rng([seed, number])
+    parts = [part(rng) for _ in range(rng.integers(1, 4))]
+    for k, (body, _, _) in enumerate(parts):
+        body.apply_translation([10.0 * k, 0.0, rng.uniform(0.05, 0.4) * (k % 2)])
+    turn = Rotation.from_euler("z", rng.uniform(0, 360), degrees=True)
+    target = rng.uniform(-0.5, 0.5, 2) * spec.footprint_mm      # of the first body's lowest point
+    pose = Pose(np.append(target, 0.0), turn)
+    return trimesh.util.concatenate([body for body, _, _ in parts]), pose, [f"{name} {tilt:g}" for _, name, tilt in parts]
+
+
+def outcome(sensor, mesh, pose):
+    """What became of a press: a row of numbers and words for the record."""
+    start = time.process_time()
+    row = {"reached_n": 0.0, "least_volume_ratio": None, "why": ""}
+    try:
+        may, _ = crushing_forces_n(sensor, place(mesh, pose=pose), FORCES_N[-1])
+        row["crushed_from_n"] = round(float(may), 2) if np.isfinite(may) else None
+        forces = np.unique(np.minimum(FORCES_N, may))
+        signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
+        result = sensor.press(mesh, pose=pose, force_n=forces, model="hyperelastic", threads=1, label="")
+        row["outcome"] = "reached" if result.within_validity.all() else "flagged"
+        row["why"] = next(filter(None, result.validity_reason), "")
+    except _TooLong:
+        row |= {"outcome": "late", "why": f"{LIMIT_S:g} s of the processor"}
+        result = None
+    except SofttactError as error:
+        row |= {"outcome": "refused" if isinstance(error, InputError) else "stopped", "why": str(error)}
+        result = getattr(error, "result", None)
+    except Exception as error:      # whatever it is, it is what is looked for
+        row |= {"outcome": "crashed", "why": f"{type(error).__name__}: {error}"}
+        result = None
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+    if result is not None and result.steps:
+        row |= {"reached_n": round(float(result.normal_force_n[-1]), 2),
+                "least_volume_ratio": round(float(result.least_volume_ratio.min()), 3)}
+    row["processor_s"] = round(time.process_time() - start, 1)
+    row["told"] = row["outcome"] != "reached" and (row["processor_s"] <= TOLD_S or row.get("crushed_from_n") is not None)
+    return row
+
+
+class _TooLong(BaseException):
+    """Raised by the processor's timer; no handler of errors in between may take it for one."""
+
+
+def _too_long(*_):
+    raise _TooLong
+
+
+def interval(good, count):
+    """Wilson's 95 % interval of a share."""
+    z, share = 1.959964, good / count
+    middle, half = share + z**2 / (2 * count), z * np.sqrt(share * (1 - share) / count + z**2 / (4 * count**2))
+    return [round(float((middle + sign * half) / (1 + z**2 / count)), 3) for sign in (-1, 1)]
+
+
+def summary(rows):
+    """Counts of the outcomes, and the share that reached its force with its interval."""
+    counts = {name: sum(row["outcome"] == name for row in rows) for name in OUTCOMES}
+    reached = counts["reached"]
+    return {"presses": len(rows), **counts, "told_of_the_rest": sum(row["told"] for row in rows),
+            "share": round(reached / len(rows), 3), "share_95_percent": interval(reached, len(rows))}
+
+
+def rows_of(name):
+    """Rows of a set in the record, if they were drawn with its seed."""
+    path = record.RESULTS / "hard_contacts.json"
+    sets = json.loads(path.read_text(encoding="utf-8"))["sets"] if path.exists() else {}
+    here = sets.get(name, {})
+    return sets, here.get("rows", []) if here.get("seed") == SEED[name] else []
+
+
+def main():
+    """Press on from the end of the record, and keep it after each press; or one press again."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--presses", type=int, default=100)
+    parser.add_argument("--set", choices=SEED, default="judged", dest="name")
+    parser.add_argument("--one", type=int, metavar="NUMBER")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGPROF, _too_long)
+    sensor = load_sensor("coro")
+    sensor.mesh, sensor.solver = MeshSettings.draft(), NewtonSettings.draft()
+    sensor.prepared("foundation")
+    sets, rows = rows_of(options.name)
+    for number in [options.one] if options.one is not None else range(len(rows), options.presses):
+        mesh, pose, bodies = contact(SEED[options.name], number, sensor.spec)
+        row = {"number": number, "bodies_and_tilts": bodies, **outcome(sensor, mesh, pose)}
+        print(row, flush=True)
+        if options.one is None:
+            rows.append(row | {"why": row["why"][:200]})
+            sets[options.name] = {"seed": SEED[options.name], **summary(rows), "rows": rows}
+            record.write("hard_contacts", sets=sets)
+
+
+if __name__ == "__main__":
+    main()
