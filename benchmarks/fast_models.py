@@ -71,7 +71,8 @@ def many(sensor, count, ways):
 def random_presses(count, *, seed=1):
     """(meshes, poses): ten indenters in turns, each in a pose of its own."""
     rng = np.random.default_rng(seed)
-    meshes = [read_mesh(f"config/objects/indenters/{MANY[k % len(MANY)]}.stl", unit="mm") for k in range(count)]
+    named = [read_mesh(f"config/objects/indenters/{name}.stl", unit="mm") for name in MANY]
+    meshes = [named[k % len(named)] for k in range(count)]
     return meshes, [_random_pose(mesh, rng) for mesh in meshes]
 
 

@@ -108,6 +108,18 @@ def batch_on_gpu() -> str:
             + table("elastic model, presses per second", rows))
 
 
+def batches() -> str:
+    """Presses per second of batches on the processor, their ratio to presses one by one, and where an elastic batch's time goes."""
+    read = record("batch")
+    rows = [[row["model"], f"{row['batch']:,}", f"{row['per_second']:.3g}", f"{row['alone_per_second']:.3g}", f"{row['ratio']:.2g}"]
+            for row in read["rows"]]
+    parts = read["parts_s"]["cpu"]
+    shares = "; ".join(f"{name} {seconds / parts['whole']:.0%}" for name, seconds in parts.items() if name != "whole")
+    return (f"{source('batch')} One core's own time, while {read['machine']['load']:.0f} programs asked for the cores: compare the "
+            f"ratios.\n\n{table('model, presses at once, a second, one by one a second, ratio', rows)}\n\n"
+            f"Of an elastic batch of 256: {shares}.")
+
+
 def growth() -> str:
     """How the cost of a hyperelastic press grows with the number of frusta, on one and two threads."""
     by_size: dict[int, dict[int, dict]] = {}
@@ -305,7 +317,7 @@ def numbers_page(counts: dict[str, int]) -> str:
 def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
-              FAST: {"batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error()},
+              FAST: {"batches": batches(), "batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error()},
               SOLID: {"races": solid_races(), "kernels": solid_kernels()},
               VIRTUAL: {"electrode field": electrode_field()}, LEARN: {"environment": environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}

@@ -72,6 +72,7 @@ def test_a_preparation_takes_no_time_once_it_is_there(computed):
     assert cache.seconds_to_prepare_foundation(CORO, LAWS) == pytest.approx(30.0)      # as much as the paper's own map
     large = changed(CORO, map_shape=[91, 91], footprint_mm=[60.0, 60.0])
     assert cache.in_words(cache.seconds_to_prepare_foundation(large, LAWS)) == "about 5 minutes"
+    assert cache.in_words(cache.seconds_to_prepare_foundation(CORO, LAWS)) == "about 30 s"
     cache.cached_foundation(CORO, LAWS)
     assert cache.seconds_to_prepare_foundation(CORO, LAWS) == 0.0
 

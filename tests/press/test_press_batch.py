@@ -71,6 +71,9 @@ def test_rows_do_not_depend_on_the_others_of_their_batch(sensor, monkeypatch):
     together = pressed(sensor)
     monkeypatch.setattr("softtact.press.batch._AT_ONCE", {"cpu": 3})
     np.testing.assert_allclose(pressed(sensor).deformation_map_mm, together.deformation_map_mm, rtol=0, atol=SAME_MM)
+    monkeypatch.setattr("softtact.press.batch._AT_ONCE", {"cpu": 64})
+    monkeypatch.setattr("softtact.models.elastic.batch._GROUP", 2)      # rectangles of nodes for two or three presses each
+    np.testing.assert_allclose(pressed(sensor).deformation_map_mm, together.deformation_map_mm, rtol=0, atol=SAME_MM)
 
 
 def test_a_press_that_cannot_be_made_has_its_sentence_and_leaves_the_others(sensor):

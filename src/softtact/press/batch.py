@@ -31,7 +31,7 @@ from softtact.press.validity import flag_buried
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_AT_ONCE = {"cpu": 64, "cuda": 4096}     # presses of one problem
+_AT_ONCE = {"cpu": 128, "cuda": 4096}     # load steps of one problem
 
 # The arrays of a `PressBatch`, which are those of a `PressResult` with a press in place of a load step.
 _OF_RESULT = ("deformation_map_mm", "thinning_map_mm", "normal_force_n", "pad_force_n", "indentation_mm", "contact_area_mm2",

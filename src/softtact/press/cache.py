@@ -20,6 +20,7 @@ from softtact.sensors.specification import AnySpec
 
 _POINTS = 1881  # of the paper's map
 _FOUNDATION_TAKES = 30, 1.5     # seconds for the paper's map, which grow with this power of the number of a map's points
+_ELASTIC_TAKES = 14, 2.0     # the same of the elastic model, on one core
 _FRUSTUM_TAKES = 20     # seconds
 _FORMAT = 12    # of the files; a new number computes them again
 
@@ -38,7 +39,7 @@ def _of_frusta(spec):
 def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
     """The elastic layer's `Compliance`; cached by the values that it depends on."""
     return _cached("compliance", _of_layer(spec), Compliance,
-                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 4, 2.0)})",
+                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, *_ELASTIC_TAKES)})",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
@@ -86,13 +87,11 @@ def _of_foundation(spec, laws):
 
 def in_words(seconds: float) -> str:
     """A time that a preparation takes, roughly."""
-    if seconds > 90:
-        return f"about {seconds / 60:.0f} minutes"
-    return "about a minute" if seconds > 45 else "half a minute" if seconds > 20 else "some seconds"
+    return f"about {seconds / 60:.0f} minutes" if seconds > 90 else f"about {5 * math.ceil(seconds / 5)} s"
 
 
 def _about(spec, seconds, power):
-    return in_words(_seconds(spec, seconds, power))
+    return f"{in_words(_seconds(spec, seconds, power))} on an idle machine"
 
 
 def _seconds(spec, seconds, power):

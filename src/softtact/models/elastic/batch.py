@@ -20,14 +20,17 @@ from array_api_compat import array_namespace, device
 from softtact.compiled import compiled
 from softtact.contact.node_grid import apply_stencil
 from softtact.contact.undersides import PosedUnderside
-from softtact.contact.unilateral import LEAST_REACH_MM, REACH, ContactLoadSteps
+from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps
 from softtact.models.elastic.compliance import Compliance, LayerPress
 from softtact.models.quarter_symmetry import PARITIES
 
 _FALL = 0.1             # of a residual, before the active set is renewed
-_MOST_KEPT = 4          # surfaces of up to 60 MB
+_MOST_KEPT = 6          # surfaces of up to 60 MB
+_GROUP, _GROUPS = 32, 8     # least columns of one rectangle, and most rectangles of a batch
+_SIDES = 5              # lengths of a rectangle's sides, so that few are prepared
+_NEAR = 1.8             # times the depth on springs, which are stiffer at a contact's edges than the layer
 _SUMMED = 128          # products that are summed up in single precision
-_ROUND = 8              # rows and columns by which rectangles grow, so that few are prepared
+_ROUNDING = 1e-6       # of a force: what single precision leaves of it
 _NEWTONS = 30           # steps to the depth on springs, a first guess
 _TINY = 1e-30           # in place of a zero that divides
 
@@ -171,21 +174,34 @@ def press_layers(compliance: Compliance, objects: list[PosedUnderside], forces_n
 def _press_columns(compliance, heights, forces_n, stops, device, settings):
     """The `LayerPress` of columns (m,) with heights (m, n): first among the nodes that the objects are expected to come near."""
     grid, area = compliance.grid, compliance.grid.areas(np.arange(compliance.grid.count))
-    lowest = heights.min(axis=1)
     first = _depths_on_springs(heights, area, forces_n / compliance.foundation_modulus)
-    near = (heights < (lowest + REACH * (first - lowest) + LEAST_REACH_MM)[:, None]).any(axis=0)
-    away = np.abs(grid.from_middle(np.flatnonzero(near))).max(axis=0) + 1
-    whole = tuple(count // 2 + 1 for count in grid.shape)
-    quarter = tuple(min(_ROUND * -(-int(wanted) // _ROUND), most) for wanted, most in zip(away[::-1], whole, strict=True))
-    found = _among(compliance, quarter, heights, forces_n, stops, first, device, settings)
+    found: dict[str, np.ndarray] = {}
+
+    def press(some, quarter):
+        part = _among(compliance, quarter, heights[some], forces_n[some], stops[some], first[some], device, settings)
+        for name, values in part.items():
+            found.setdefault(name, np.empty((len(heights), *values.shape[1:]), dtype=values.dtype))[some] = values
+
+    quarters = _quarters(grid, heights, first)
+    order = np.argsort(quarters.prod(axis=1), kind="stable")
+    for some in np.array_split(order, max(1, min(len(order) // _GROUP, _GROUPS))):
+        press(some, tuple(int(side) for side in quarters[some].max(axis=0)))
     deeper = (found["gap"] < -settings.tolerance_mm).any(axis=1) & found["settled"]      # than expected: others touch, too
     if deeper.any():
-        again = _among(compliance, whole, heights[deeper], forces_n[deeper], stops[deeper], first[deeper], device, settings)
-        for name, values in again.items():
-            found[name][deeper] = values
+        press(np.flatnonzero(deeper), tuple(count // 2 + 1 for count in grid.shape))
     fields = grid.with_held_sides(found.pop("fields").reshape(-1, *grid.shape))
-    found |= {"force": found["force"].T, "gap": found["gap"].T}
-    return LayerPress(fields=fields, contact=ContactLoadSteps(**found), areas=area)
+    return LayerPress(fields=fields, contact=ContactLoadSteps(**found | {"force": found["force"].T, "gap": found["gap"].T}),
+                      areas=area)
+
+
+def _quarters(grid, heights, depths):
+    """Rows and columns (m, 2) of the quarter's rectangle that objects with heights (m, n) come near at depths (m,) on springs."""
+    lowest, whole = heights.min(axis=1), np.array([count // 2 + 1 for count in grid.shape])
+    near = heights < (lowest + _NEAR * (depths - lowest) + LEAST_REACH_MM)[:, None]
+    away = np.abs(grid.from_middle(np.arange(grid.count)))
+    wanted = np.column_stack([np.where(near, along, 0).max(axis=1) + 1 for along in away.T[::-1]])
+    step = -(-whole // _SIDES)
+    return np.minimum(step * -(-wanted // step), whole)
 
 
 def _among(compliance, quarter, heights, forces_n, stops, first, device, settings):
@@ -261,7 +277,10 @@ class _Columns:
         even = surface.precondition(mask) * mask
         weight = xp.clip(xp.sum(even, axis=0), min=_TINY)
         change = xp.astype(kept - before, xp.float32) + even * (lacking / weight)
-        moved = surface.displacement(change)
+        if xp.all(active | (before == 0)) and xp.all(xp.abs(lacking) <= _ROUNDING * self.forces[columns]):     # the first time
+            change, moved = xp.zeros_like(change), xp.zeros_like(change)
+        else:
+            moved = surface.displacement(change)
         right = (xp.astype(-gap, xp.float32) - moved) * mask
         self._conjugate_gradients(change, moved, right, mask, even * (free / weight), free)
         self.force[:, columns] = (before + change) * active     # no rounded rest where nothing touches
