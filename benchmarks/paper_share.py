@@ -31,8 +31,8 @@ def main(every=20, cores=2):
                     "--configfile", CONFIG, "--", *wanted], check=False)
     costs = opened.costs(read_costs(), f"results/{opened.name}")
     rows = [asdict(cost) | {"hours": round(cost.hours, 2)} for cost in costs]
-    print(f"{len(wanted)} presses of {sum(cost.jobs for cost in costs if cost.stage.startswith('simulate_press'))}: the whole study "
-          f"takes {sum(cost.hours for cost in costs):.0f} core hours")
+    presses = sum(cost.jobs for cost in costs if cost.stage.startswith("simulate_press"))
+    print(f"{len(wanted)} presses of {presses}: the whole study takes {sum(cost.hours for cost in costs):.0f} core hours")
     record.write("paper_share", pressed=len(wanted), rows=rows)
 
 
