@@ -5,6 +5,7 @@
 # `make everything`: all default studies.  `make studies`: the smallest forms of all.  `make overview`: Snakemake's report of them.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results pages in docs/, from the finished runs of default studies.
+# `make release VERSION=0.2.0`: a release for review; it says what to type to upload it.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
@@ -16,7 +17,7 @@ unexport PYTHONDONTWRITEBYTECODE
 DEFAULT_STUDIES = config skin probe grasps decide markers real
 TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps tiny-decide tiny-markers tiny-real
 
-.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide markers real test test-slow lint advice bench docs gallery numbers results clean
+.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps decide markers real test test-slow lint advice bench docs gallery release numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -82,6 +83,10 @@ docs: numbers gallery
 # The pictures of docs/gallery.md, each by its own lines there.
 gallery: .venv/tested
 	$(BIN)/python scripts/draw_gallery.py
+
+# A release, prepared and tested: version, changelog, citation, recipe, documentation, wheel and sdist. Nothing is uploaded.
+release: docs
+	$(BIN)/python scripts/release.py $(or $(VERSION),$(error say which: make release VERSION=0.2.0))
 
 numbers: .venv/tested
 	$(BIN)/python scripts/write_numbers.py
