@@ -46,3 +46,10 @@ def test_another_form_of_version_or_an_earlier_one_is_refused(version, said):
 def test_a_release_without_changes_or_a_second_of_one_version_is_refused(changelog):
     with pytest.raises(ValueError, match=r"CHANGELOG\.md"):
         release.changelog_with(changelog, "0.2.0", "2026-02-01")
+
+
+def test_the_paper_cites_what_its_bibliography_holds_and_each_entry_says_where_it_is_found():
+    cited = set(re.findall(r"@([a-z]+)", (ROOT / "paper/paper.md").read_text()))
+    entries = dict(re.findall(r"^@[a-z]+\{([a-z]+),\n(.*?)^\}", (ROOT / "paper/paper.bib").read_text(), re.MULTILINE | re.DOTALL))
+    assert cited == set(entries)
+    assert all(re.search(r"^  doi +=|howpublished", entry, re.MULTILINE) for entry in entries.values())
