@@ -20,6 +20,7 @@ PERFORMANCE = ROOT / "docs" / "performance.md"
 EDGE, FAST, SOLID, VIRTUAL = (ROOT / "docs" / "explanation" / f"{name}.md"
                                for name in ("edge", "fast_models", "solid", "virtual_sensor"))
 LEARN = ROOT / "docs" / "how-to" / "learn_with_the_environment.md"
+POSE = ROOT / "docs" / "how-to" / "find_a_pose_from_taxels.md"
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
@@ -306,6 +307,16 @@ def hard_contacts() -> str:
     return f"{source('contacts')} Seconds of one thread are the processor's, of two the clock's.\n\n{table(head, rows)}"
 
 
+def poses() -> str:
+    """Errors of poses that were found from taxels, with gradients and without."""
+    read = record("pose_from_taxels")
+    columns = ("median_mm", "median_degrees", "ninth_decile_mm", "ninth_decile_degrees", "median_presses", "mean_process_s")
+    rows = [[name, *(f"{row[column]:.2g}" for column in columns)] for name, row in read["ways"].items()]
+    head = "way, median (mm), median (degrees), nine in ten below (mm), nine in ten below (degrees), presses, processor (s)"
+    return (f"{source('pose_from_taxels')} {read['poses']} poses, {read['force_n']:g} N, noise of {read['noise_counts']:g} counts, "
+            f"at most {read['budget']} presses.\n\n{table(head, rows)}")
+
+
 def numbers_page(counts: dict[str, int]) -> str:
     """The text of docs/reference/numbers.md."""
     parts = {"Tests": tests(counts), "Whole runs": whole_runs(), "Growth of a hyperelastic press with the sensor": growth(),
@@ -319,7 +330,8 @@ def pages() -> dict[Path, str]:
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
               FAST: {"batches": batches(), "batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error()},
               SOLID: {"races": solid_races(), "kernels": solid_kernels()},
-              VIRTUAL: {"electrode field": electrode_field()}, LEARN: {"environment": environment()}}
+              VIRTUAL: {"electrode field": electrode_field()}, LEARN: {"environment": environment()},
+              POSE: {"poses": poses()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 
 
