@@ -166,9 +166,12 @@ def test_a_vector_times_the_gradient_is_the_gradient_of_the_product(sensor):
     np.testing.assert_allclose(found.vjp(weights)[:, 5], (weights * found["force"]).sum(axis=(1, 2)))
 
 
-def test_a_pressed_result_keeps_its_sensor_in_this_process_only(sensor):
-    result = pressed(sensor)
-    assert result.origin.sensor is sensor and pickle.loads(pickle.dumps(result)).origin is None
+def test_a_result_refers_to_its_sensor_and_object_in_this_process_only(sensor):
+    """It copies neither: many results of one object would take more memory than they hold numbers."""
+    mesh = ellipsoid()
+    result = pressed(sensor, mesh=mesh)
+    assert result.origin.sensor is sensor and result.origin.mesh is mesh
+    assert pickle.loads(pickle.dumps(result)).origin is None
 
 
 @pytest.mark.parametrize(("of", "by", "sentence"), [

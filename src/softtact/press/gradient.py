@@ -19,6 +19,7 @@ from softtact.contact.object_points import ObjectPoints
 from softtact.contact.underside import Underside
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import InputError
+from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
@@ -81,10 +82,15 @@ class Origin:
 
     sensor: "Sensor"
     """Its sensor."""
-    placed: trimesh.Trimesh
-    """The object in its pose in the sensor frame, in mm."""
+    mesh: trimesh.Trimesh
+    """The object as it was given, in mm."""
     pose: Pose
-    """That pose."""
+    """Its pose in the sensor frame."""
+
+    @property
+    def underside(self) -> HeightField:
+        """The object's underside in its pose; found again, as it takes more memory than a result."""
+        return HeightField(place(self.mesh, pose=self.pose))
 
 
 def gradient(result: "PressResult", of: str, by: Sequence[str]) -> Gradient:
@@ -148,7 +154,7 @@ class _Rates:
 
 def _of_elastic(result, names):
     origin, spec = result.origin, result.origin.sensor.spec
-    compliance, surface = origin.sensor.prepared("elastic"), HeightField.of(origin.placed)
+    compliance, surface = origin.sensor.prepared("elastic"), origin.underside
     points, press = _pressed_layer(result, compliance, surface)
     layer = PressedLayer(compliance, points, press)
     found = _by_names(names, layer, origin, points, compliance.grid, surface)
@@ -220,7 +226,7 @@ def _by_gap_at_rest(spec, read):
 
 def _of_foundation(result, names):
     origin, spec = result.origin, result.origin.sensor.spec
-    compliance, in_pose = origin.sensor.prepared("foundation"), HeightField.of(origin.placed)
+    compliance, in_pose = origin.sensor.prepared("foundation"), origin.underside
     surface = in_pose.near_touch(spec.map_x_mm, spec.map_y_mm)
     underside = Underside(surface, compliance.grid)
     points = underside.points(_reach(result, underside, compliance, spec.thickness_mm))
