@@ -281,7 +281,7 @@ SETTINGS = {
     "path": {"places_mm": [0], "angles_deg": [0, 30], "step_mm": 0.25, "depth_mm": 0.5, "aside_mm": 0.5},
     "share": {"train_poses": 1, "held_out_poses": 1, "unseen_poses": 1, "held_out": 1, "train_depths_mm": [0.5],
               "test_depths_mm": [0.5]},
-    "networks": {"size": "reduced", "names": ["proposed", "pix2pix"], "seeds": 1, "training": {"epochs": 1, "constant_epochs": 1},
+    "networks": {"size": "reduced", "names": ["proposed", "pix2pix"], "seeds": [3], "training": {"epochs": 1, "constant_epochs": 1},
                  "device": "cpu"},
     "baselines": ["full_stick"], "scored_every": 2, "sliding": {"depth_mm": 0.5, "aside_mm": 0.5}, "shown": 1}
 
@@ -315,6 +315,9 @@ def test_networks_are_trained_from_each_seed(study_file, seeds, trained):
     made = jobs(load_study(values, study_file), "results")
     for stage in ("train_network", "score_network"):
         assert [job.settings["seed"] for job in made if job.stage == stage and job.settings["network"] == "proposed"] == trained
+    trainings = {file for job in made if job.stage == "train_network" for file in job.made().values()}
+    read = [str(file) for job in made for files in job.inputs.values() for file in ([files] if isinstance(files, str) else files)]
+    assert all(file in trainings for file in read if "/learning/" in file)
 
 
 def test_a_seed_named_twice_is_refused(study_file):

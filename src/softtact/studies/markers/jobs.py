@@ -203,7 +203,7 @@ class _Jobs:
             "slide_objects",
             {
                 "sequences": [f"{folder}/sliding/{name}.nc" for name in self.study.objects],
-                "generators": [self.generator(name, 0) for name in first],
+                "generators": [self.generator(name, self.values.networks.seeds[0]) for name in first],
             },
             {"table": f"{folder}/scores/sliding.csv"},
             {"networks": first, "marker_radius_px": self.study.marker_radius_px},
@@ -223,7 +223,7 @@ class _Jobs:
             {"sources": self.sources, "trained": list(values.objects.train), "networks": list(values.networks.names)},
         )
         first, tested = list(values.networks.names), self._tested()
-        generators = [self.generator(name, 0) for name in first]
+        generators = [self.generator(name, self.values.networks.seeds[0]) for name in first]
         shown = {"marker_radius_px": self.study.marker_radius_px, "shown": values.shown}
         errors = {"sources": self.sources, "trained": list(values.objects.train)}
         drawn = {

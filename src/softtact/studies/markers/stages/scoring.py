@@ -15,7 +15,7 @@ from softtact.studies.markers.scoring import COLUMNS, Camera, Made, Truth, marke
 if TYPE_CHECKING:
     import xarray
 
-SLIDING_COLUMNS = ["source", "seed", "object", "state", "change_px", "markers_lost"]
+SLIDING_COLUMNS = ["source", "object", "state", "change_px", "markers_lost"]
 
 
 def score_network(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -137,7 +137,6 @@ def _slid(source: str, name: str, state: str, before: np.ndarray, after: np.ndar
     known = np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1)
     return {
         "source": source,
-        "seed": 0,
         "object": name,
         "state": state,
         "change_px": marker_sum_change_px(before[known], after[known]) if known.any() else np.nan,
