@@ -219,8 +219,8 @@ def observed_loads(poses: np.ndarray, forces: np.ndarray) -> dict[str, np.ndarra
     return {"force_n": forces.astype(np.float32), "object_pose": poses[..., 0, :].astype(np.float32)}
 
 
-def three_numbers(action):
-    """An action as three finite numbers."""
+def three_numbers(action: Any) -> np.ndarray:
+    """An action as three finite numbers (3,). Raises InputError that shows it where it is not."""
     try:
         values = np.asarray(action)
         values = values.astype(float) if values.dtype.kind in "fiu" else np.array(np.nan)
