@@ -8,9 +8,11 @@ import trimesh
 from foundation_study import SMALL, points_of
 from support.laws import LAWS
 
+from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.gradient import Balance, Tangent
 from softtact.models.foundation.solve import settled_contacts
 from softtact.models.quarter_symmetry import ParityBlocks
+from softtact.press import gradient
 from softtact.press.sensor import Sensor
 
 FORCE, POSE = 6.0, (0.3, -0.4, 0.0, 4.0, -3.0, 20.0)
@@ -118,3 +120,25 @@ def test_a_gradient_of_a_press_is_about_the_difference_of_presses(compliance, by
     for of, name in (("tactile_map", "tactile_map"), ("deformation_map", "deformation_map_mm"), ("depth", "indentation_mm")):
         found, wanted = result.gradient(of, by)[by], (getattr(upper, name) - getattr(lower, name)) / (2 * step)
         assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted) + 2.5e-3 * (of == "depth"), of
+
+
+@pytest.mark.slow
+def test_a_gradient_by_thickness_is_about_the_difference_of_thicker_and_thinner_covers(compliance, law, monkeypatch):
+    """Within 5 %, as above; the maps' derivative is that of presses on sensors whose cover is 5 % thicker and thinner."""
+    def made(spec, laws=LAWS):
+        return foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"], frustum=law)
+
+    monkeypatch.setattr(gradient, "cached_foundation", made)
+    mesh, pose = ellipsoid(subdivisions=6), [*POSE[:2], 3.0, *POSE[3:]]
+    mesh.apply_scale(2.5)
+
+    def press(share):
+        spec = SMALL.with_upper_layer((1 + share) * SMALL.upper_layer_mm)
+        sensor = Sensor(spec, LAWS, prepared_models={"foundation": made(spec) if share else compliance})
+        return sensor.press(mesh, pose=pose, force_n=FORCE, model="foundation", label="")
+
+    upper, lower, apart_mm = press(0.05), press(-0.05), 0.1 * SMALL.upper_layer_mm
+    for of, name in (("tactile_map", "tactile_map"), ("deformation_map", "deformation_map_mm"), ("depth", "indentation_mm")):
+        found = press(0.0).gradient(of, "thickness")["thickness"]
+        wanted = (getattr(upper, name) - getattr(lower, name)) / apart_mm
+        assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted), of
