@@ -92,6 +92,14 @@ def test_a_batch_has_the_contact_of_the_active_set_of_each_press(compliance, dev
             assert press.contact.force[:, column].sum() == pytest.approx(FORCES[step], rel=1e-6)
 
 
+def test_objects_that_sink_deeper_than_on_springs_touch_beyond_the_nodes_that_were_near(compliance, monkeypatch):
+    objects, forces = objects_over(compliance)[:1], np.full((1, 1), 3.0)
+    expected = press_layers(compliance, objects, forces)
+    for name, value in (("_NEAR", 0.0), ("LEAST_REACH_MM", 0.01), ("_SIDES", 50)):
+        monkeypatch.setattr(f"softtact.models.elastic.batch.{name}", value)
+    np.testing.assert_allclose(press_layers(compliance, objects, forces).fields, expected.fields, rtol=0, atol=2e-6)     # mm
+
+
 @pytest.mark.parametrize("device", DEVICES)
 def test_an_object_that_rests_on_the_shell_is_held_there_beside_presses_that_do_not(compliance, device):
     ball = trimesh.creation.icosphere(radius=4.0)
