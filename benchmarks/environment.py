@@ -48,7 +48,7 @@ def run(env, actions):
 def rates(model):
     """Rows of one model."""
     env = gymnasium.make(environment.ENVIRONMENT, model=model, max_episode_steps=10_000)
-    memory = env.unwrapped._memory
+    memory = env.unwrapped.readings
     env.reset(seed=0, options=STILL)
     run(env, [CLOSE] * CLOSING)
     for case in ("slide", "again"):
@@ -77,7 +77,7 @@ def episodes(model):
         spent += np.subtract((time.process_time(), time.perf_counter()), start)
         seconds, count = run(env, smooth_policy(seed))
         spent, steps = spent + seconds, steps + count
-    return row(model, "episodes", steps, tuple(spent), env.unwrapped._memory.places)
+    return row(model, "episodes", steps, tuple(spent), env.unwrapped.readings.places)
 
 
 def smooth_policy(seed):

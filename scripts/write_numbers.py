@@ -200,6 +200,17 @@ def environment() -> str:
     return f"{source('environment')}\n\n{table(head, rows)}\n\n{table(of_errors, off)}"
 
 
+def vector_environment() -> str:
+    """Observations a second of many hands, in one batch and as single environments."""
+    words = {"slide": "slide through new places", "again": "slide through known places", "held": "hold their objects",
+             "episodes": "play whole episodes at random", "later": "play the same episodes again"}
+    rows = record("vector_environment")["rows"]
+    found = {(row["mode"], row["case"]): row["per_second_of_two_cores"] for row in rows}
+    hands = rows[0]["hands"]
+    lines = [[f"all {hands} {text}", found["sync", case], found["vector_entry_point", case]] for case, text in words.items()]
+    return f"{source('vector_environment')}\n\n{table('the hands, single environments (sync), one batch', lines)}"
+
+
 def expected_error() -> str:
     """How well the error of the fast models is told for objects that nothing was fitted to."""
     read = record("expected_error")
@@ -330,8 +341,8 @@ def pages() -> dict[Path, str]:
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
               FAST: {"batches": batches(), "batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error()},
               SOLID: {"races": solid_races(), "kernels": solid_kernels()},
-              VIRTUAL: {"electrode field": electrode_field()}, LEARN: {"environment": environment()},
-              POSE: {"poses": poses()}}
+              VIRTUAL: {"electrode field": electrode_field()}, POSE: {"poses": poses()},
+              LEARN: {"environment": environment(), "vector environment": vector_environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 
 

@@ -73,6 +73,18 @@ def test_readings_of_many_hands_at_once_are_those_of_each_alone():
     assert (memory.observe(poses[1], forces[1])["tactile"] == seen["tactile"][1]).all() and (errors > 0).all()
 
 
+def test_places_pressed_in_one_batch_read_as_pressed_alone():
+    alone = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
+    batch = TaxelMemory(alone.sensor, CYLINDER, "elastic", LARGEST_N)
+    keys = [(0, 1, -2, 3), (1, -1, 0, 170), (0, 30, 0, 0)]     # the last one is beside the sensor
+    batch._press_together(keys)     # as on a GPU, here on the processor
+    alone._press({*keys})
+    for key in keys:
+        one, other = alone._ladders[key], batch._ladders[key]
+        assert np.abs(one.maps_mm - other.maps_mm).max() < 1e-3 * max(one.maps_mm.max(), 1e-9)     # patches of the ladder
+        assert (one.relative_error == other.relative_error).all()
+
+
 def test_the_expected_error_of_a_reading_is_that_of_its_press():
     memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
     _, errors = memory.observe_many(np.array([[[0.0, 0, 0, 1, 0, 0, 0]]]), np.array([[[0.0, 0.0, -10.0]]]))

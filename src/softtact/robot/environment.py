@@ -55,11 +55,13 @@ class GraspEnv(gymnasium.Env):
 
     def __init__(self, mesh: trimesh.Trimesh | str | Path | None = None, *, unit: str | None = None, sensor: str = "coro",
                  model: str = "elastic", largest_force_n: float = 30.0, mass_kg: float | None = None,
-                 scene: Mapping[str, Any] | None = None, place_step_mm: float = STEP_MM, render_mode: str | None = None) -> None:
+                 scene: Mapping[str, Any] | None = None, place_step_mm: float = STEP_MM, device: str = "cpu",
+                 render_mode: str | None = None) -> None:
         """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder with its flat ends on the pads
 
         model: elastic or foundation;  scene: keys of a scene file, such as {"friction": 0.4}
-        place_step_mm: grid of the places that are pressed (`TaxelMemory`); of taxels alone
+        place_step_mm: grid of the places that are pressed (`TaxelMemory`);
+        device: cpu, cuda or auto, where they are pressed; both of taxels alone
         render_mode: rgb_array, for pictures of the hand by `render`, or None
         Raises InputError for a model that is too slow, and as `build_scene` does.
         """
@@ -73,6 +75,7 @@ class GraspEnv(gymnasium.Env):
         self._mesh = _mesh_of(mesh, unit)
         self.largest_force_n = number("largest_force_n", largest_force_n, unit="N")
         self._model, self._place_step_mm = model, number("place_step_mm", place_step_mm, unit="mm")
+        self._device = device
         self.readings = self._new_readings()
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({
@@ -84,7 +87,8 @@ class GraspEnv(gymnasium.Env):
     def _new_readings(self) -> TaxelMemory | GelReadings:
         if has_gel(self._sensor):
             return GelReadings(self._sensor, self._mesh, self._settings.friction, self._model, self.largest_force_n)
-        return TaxelMemory(self._sensor, self._mesh, self._model, self.largest_force_n, self._place_step_mm)
+        return TaxelMemory(self._sensor, self._mesh, self._model, self.largest_force_n, self._place_step_mm,
+                           self._device)
 
     def beside(self) -> "GraspEnv":
         """Another environment with the same options; both share object, sensor and the memory of taxels, not the gels."""

@@ -20,10 +20,13 @@ from scipy.spatial.transform import Rotation
 
 from softtact.compiled import compiled
 from softtact.contact.height_field import HeightField
-from softtact.errors import InputError
+from softtact.contact.undersides import ObjectSurface
+from softtact.devices import find_device
+from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.linalg.workers import Workers, one_thread_each
+from softtact.press.batch import press_together, together
 from softtact.press.choice import ELASTIC_RELATIVE, rms, with_expected_error
 from softtact.press.fast import press_underside, thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
@@ -54,7 +57,8 @@ class TaxelMemory:
     """Counts of both sensors under one object.
 
     model: elastic or foundation;  largest_force_n: limit of the forces
-    step_mm: of the grid of places along x and y;  surfaces: number of undersides that are kept, some MB each for a fine mesh
+    step_mm: of the grid of places along x and y;  device: cpu, cuda or auto: a GPU where there is one, for the elastic model
+    surfaces: number of undersides that are kept, some MB each for a fine mesh
     """
 
     sensor: Sensor
@@ -62,6 +66,7 @@ class TaxelMemory:
     model: str
     largest_force_n: float
     step_mm: float = STEP_MM
+    device: str = "cpu"
     surfaces: int = 8
     _warned: bool = False
     _ladders: dict = field(default_factory=dict)
@@ -69,6 +74,10 @@ class TaxelMemory:
 
     def __post_init__(self) -> None:
         self.sensor.spec.need_taxels("the environment")
+        self.device = find_device(self.device)
+        if self.device != "cpu" and not (self.model == "elastic" and together(self.sensor)):
+            raise InputError(f"device={self.device!r}: only the elastic model presses places on a GPU, on sensors whose lower side "
+                             "is held; leave it out.")
         side = min(self.sensor.spec.footprint_mm)
         if not 0 < self.step_mm < side:
             raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
@@ -151,10 +160,12 @@ class TaxelMemory:
         return [(nearest, 1 - abs(beyond)), (nearest + [np.sign(beyond).astype(int), 0, 0], abs(beyond))]
 
     def _press(self, keys):
-        """Press places by their keys, as many at a time as there are cores."""
+        """Press places by their keys: on a processor as many at a time as there are cores, on a GPU all together."""
         if not keys:
             return
         self.sensor.prepared(self.model)
+        if self.device != "cpu":
+            return self._press_together(sorted(keys))
         surfaces = {key: self._surface(key[0], key[3]).moved(np.array([key[1], key[2], 0]) * self.step_mm) for key in sorted(keys)}
         workers = Workers(min(len(surfaces), cores()))
         with one_thread_each(), warnings.catch_warnings(record=True) as heard:
@@ -165,6 +176,17 @@ class TaxelMemory:
             self._warned = True
             warnings.warn(heard[0].message, stacklevel=2)
         self._ladders.update(zip(surfaces, found, strict=True))
+
+    def _press_together(self, keys):
+        """Press places in one batch, with which a processor would take twice as long."""
+        poses = [Pose(np.array([x, y, 0.0]) * self.step_mm, self._turned(finger, turn)) for finger, x, y, turn in keys]
+        results = press_together(self.sensor, [ObjectSurface(self.mesh)] * len(keys), poses, self.forces_n, device=self.device)
+        for key, result in zip(keys, results, strict=True):
+            if isinstance(result, ConvergenceError):
+                raise result
+            beside = isinstance(result, SofttactError)
+            maps = np.zeros((_FORCES, *self.sensor.spec.map_shape)) if beside else result.thinning_map_mm
+            self._ladders[key] = self._place(maps, np.full(_FORCES, 0.0 if beside else ELASTIC_RELATIVE))
 
     def _pressed(self, surface):
         """The ladder of an underside in its place."""
@@ -178,6 +200,9 @@ class TaxelMemory:
                 relative = result.expected_error_mm / np.maximum(rms(maps), np.finfo(float).tiny)
         except InputError:     # the object is beside this sensor
             maps, relative = np.zeros((_FORCES, *self.sensor.spec.map_shape)), np.zeros(_FORCES)
+        return self._place(maps, relative)
+
+    def _place(self, maps, relative):
         unknown = np.isnan(self.sensor.spec.frustum_height_mm)     # errors were calibrated on sensors with frusta
         return _Place(self.forces_n, maps.astype(np.float32), np.where(unknown, np.nan, relative))
 
@@ -186,9 +211,13 @@ class TaxelMemory:
         if (finger, turn) not in self._surfaces:
             if len(self._surfaces) >= self.surfaces:
                 self._surfaces.pop(next(iter(self._surfaces)))
-            pose = Pose(np.zeros(3), _FACING[finger] * Rotation.from_euler("z", turn * _STEP_DEG, degrees=True))
+            pose = Pose(np.zeros(3), self._turned(finger, turn))
             self._surfaces[finger, turn] = HeightField(place(self.mesh, pose=set_down(self.mesh, pose)))
         return self._surfaces[finger, turn]
+
+    @staticmethod
+    def _turned(finger, turn):
+        return _FACING[finger] * Rotation.from_euler("z", turn * _STEP_DEG, degrees=True)
 
     def _carrying(self, here, there, sense):
         """Matrix (2, 2) and offset (2,) from a point of the map (y, x), for an object in one place (x, y, rotation), to where that
