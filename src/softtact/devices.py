@@ -21,7 +21,7 @@ def find_device(name: str, *, library: str = "torch") -> str:
     Raises InputError where the name is unknown, or the GPU that was asked for is not there.
     """
     title, pattern, choices = _NAMES[library]
-    if not re.fullmatch(pattern, name):
+    if not re.fullmatch(pattern, str(name)):
         raise InputError(f"device={name!r} is unknown; write {choices}.")
     if name in ("cpu", "warp") or (name == "auto" and not _has_driver()):
         return name.replace("auto", "cpu")

@@ -166,6 +166,22 @@ def test_a_vector_times_the_gradient_is_the_gradient_of_the_product(sensor):
     np.testing.assert_allclose(found.vjp(weights)[:, 5], (weights * found["force"]).sum(axis=(1, 2)))
 
 
+@pytest.mark.parametrize("shape", [(), (1, 2, 2), (2, 2), (3, 2, 2, 2)])
+def test_a_vector_of_another_shape_is_refused_instead_of_broadcast(shape):
+    found = gradient.Gradient("tactile_map", np.ones((2, 2, 2, 1)), ("x",), ("counts/mm",), np.ones((2, 1)))
+    with pytest.raises(InputError, match="vjp: the cotangent has the shape .*; give .2, 2, 2., that of tactile_map"):
+        found.vjp(np.ones(shape))
+
+
+def test_an_object_that_was_changed_after_its_press_is_refused(sensor):
+    """Its contact is found again for the gradient."""
+    mesh = ellipsoid()
+    result = pressed(sensor, mesh=mesh)
+    mesh.apply_scale(0.5)
+    with pytest.raises(InputError, match="mesh was changed after the press"):
+        result.gradient("depth", "x")
+
+
 def test_a_result_refers_to_its_sensor_and_object_in_this_process_only(sensor):
     """It copies neither: many results of one object would take more memory than they hold numbers."""
     mesh = ellipsoid()
@@ -177,7 +193,8 @@ def test_a_result_refers_to_its_sensor_and_object_in_this_process_only(sensor):
 @pytest.mark.parametrize(("of", "by", "sentence"), [
     ("force", "pose", "there is no quantity with a gradient 'force'"),
     ("depth", "posse", "there is no parameter with a gradient 'posse'; did you mean 'pose'"),
-    ("depth", ["x", "friction"], "a press with friction depends on its whole path")])
+    (["depth"], "x", "there is no quantity with a gradient"), ("depth", [], "name at least one parameter of: pose, x"),
+    ("depth", None, "name at least one parameter"), ("depth", ["x", "friction"], "a press with friction depends on its whole path")])
 def test_unknown_names_are_refused(sensor, of, by, sentence):
     with pytest.raises(InputError, match=sentence):
         pressed(sensor).gradient(of, by)

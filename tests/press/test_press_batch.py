@@ -76,13 +76,25 @@ def test_rows_do_not_depend_on_the_others_of_their_batch(sensor, monkeypatch):
     np.testing.assert_allclose(pressed(sensor).deformation_map_mm, together.deformation_map_mm, rtol=0, atol=SAME_MM)
 
 
+def test_a_press_is_read_as_if_it_were_alone_whatever_presses_beside_it(sensor):
+    """The readout inverts by a table down to the highest point of the bulge: that of a deep pin is another one."""
+    ball, pin = (BALL, (0, 0, 0, 0, 0, 0), 20.0), (trimesh.creation.cylinder(radius=0.4, height=12.0), (0, 0, 6, 0, 0, 0), 50.0)
+    one, beside = (pressed(sensor, jobs) for jobs in ([ball], [ball, pin]))
+    np.testing.assert_allclose(beside.thinning_map_mm[0], one.thinning_map_mm[0], rtol=0, atol=1e-6)
+    several = [sensor.press_many([BALL, *others], [ball[1]] * (1 + len(others)), force_n=[1.0, 20.0], model="elastic", workers=1,
+                                 label="")[0] for others in ([], [pin[0]])]
+    np.testing.assert_allclose(several[1].thinning_map_mm, several[0].thinning_map_mm, rtol=0, atol=1e-6)
+
+
 def test_a_press_that_cannot_be_made_has_its_sentence_and_leaves_the_others(sensor):
-    jobs = [JOBS[0], (PUNCH, (50, 0, 1, 0, 0, 0), 4.0), (PUNCH, (0, 0, 1, np.nan, 0, 0), 4.0), JOBS[1]]
+    jobs = [JOBS[0], (PUNCH, (50, 0, 1, 0, 0, 0), 4.0), (PUNCH, (0, 0, 1, np.nan, 0, 0), 4.0), (PUNCH, (0, 0, "x", 0, 0, 0), 4.0),
+            JOBS[1]]
     batch = pressed(sensor, jobs)
-    assert sorted(batch.errors) == [1, 2] and (batch.converged == [True, False, False, True]).all()
+    assert sorted(batch.errors) == [1, 2, 3] and (batch.converged == [True, False, False, False, True]).all()
     assert "misses the sensor" in batch.validity_reason[1] and "not six finite numbers" in batch.validity_reason[2]
-    assert not batch.deformation_map_mm[1:3].any() and not batch.within_validity[1:3].any()
-    np.testing.assert_allclose(batch.deformation_map_mm[[0, 3]], pressed(sensor, JOBS[:2]).deformation_map_mm, rtol=0, atol=SAME_MM)
+    assert "not six numbers" in batch.validity_reason[3]
+    assert not batch.deformation_map_mm[1:4].any() and not batch.within_validity[1:4].any()
+    np.testing.assert_allclose(batch.deformation_map_mm[[0, 4]], pressed(sensor, JOBS[:2]).deformation_map_mm, rtol=0, atol=SAME_MM)
 
 
 def test_a_batch_of_failures_is_a_batch(sensor):
@@ -108,6 +120,45 @@ def test_wrong_counts_forces_and_models_are_refused(sensor):
         press_batch(sensor, surface, poses, [1.0, -1.0])
     with pytest.raises(InputError, match="model='hyperelastic': a batch is pressed by the elastic or the foundation model"):
         press_batch(sensor, surface, poses, 4.0, model="hyperelastic")
+    with pytest.raises(InputError, match="device=None is unknown"):
+        press_batch(sensor, surface, poses, 4.0, device=None)
+    with pytest.raises(InputError, match="device='cuda': only the elastic model presses on a GPU"):
+        press_batch(sensor, surface, poses, 4.0, model="foundation", device="cuda")
+
+
+@pytest.mark.parametrize(("surface", "poses", "force", "sentence"), [
+    (ObjectSurface(PUNCH), np.zeros(6), 4.0, "the poses are not a list of poses"),
+    (ObjectSurface(PUNCH), None, 4.0, "the poses are not a list of poses"),
+    (ObjectSurface(PUNCH), "0,0,0,0,0,0", 4.0, "the poses are not a list of poses"),
+    (ObjectSurface(PUNCH), np.zeros((2, 6)), "much", "force_n='much' is not a number"),
+    (ObjectSurface(PUNCH), np.zeros((2, 6)), np.ones((2, 1)), r"The forces have the shape \(2, 1\) and 2 poses"),
+    (PUNCH, np.zeros((2, 6)), 4.0, "an object is a Trimesh; give ObjectSurface"),
+    ([PUNCH] * 2, np.zeros((2, 6)), 4.0, "an object is a Trimesh; give ObjectSurface"),
+    (None, np.zeros((2, 6)), 4.0, "an object is a NoneType; give ObjectSurface")])
+def test_arguments_of_another_kind_are_refused_in_a_sentence(sensor, surface, poses, force, sentence):
+    with pytest.raises(InputError, match=sentence):
+        press_batch(sensor, surface, poses, force)
+
+
+def changed(change):
+    mesh = BALL.copy()
+    change(mesh)
+    return mesh
+
+
+@pytest.mark.parametrize(("mesh", "sentence"), [
+    (trimesh.Trimesh(), "has no facets"), (changed(trimesh.Trimesh.invert), "is inside out"),
+    (changed(lambda mesh: mesh.vertices.__setitem__(0, np.nan)), "corners that are not finite")])
+def test_a_mesh_that_is_no_body_is_refused_alone_and_in_a_batch(sensor, mesh, sentence):
+    with pytest.raises(InputError, match=sentence):
+        ObjectSurface(mesh)
+    with pytest.raises(InputError, match=sentence):
+        alone(sensor, mesh, (0, 0, 0, 0, 0, 0), 4.0)
+
+
+def test_a_surface_of_anything_but_a_mesh_is_refused():
+    with pytest.raises(InputError, match="'part.stl' is no mesh; read one with softtact.read_mesh"):
+        ObjectSurface("part.stl")
 
 
 def test_a_sensor_whose_lower_side_is_free_is_pressed_one_by_one_with_the_same_rows():

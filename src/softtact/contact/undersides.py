@@ -18,7 +18,7 @@ from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
 from softtact.contact.underside import Underside
 from softtact.errors import InputError
-from softtact.geometry.meshes import check_over_sensor, default_pose, place
+from softtact.geometry.meshes import check_given, check_over_sensor, default_pose, place
 from softtact.geometry.pose import Pose
 
 _LEVEL = 1e-9       # cosine below which a facet is a wall; a point's slack beside a facet, as in `HeightField`
@@ -29,6 +29,10 @@ class ObjectSurface:
     """A rigid object, a closed mesh in mm in its own frame, prepared for any number of poses."""
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
+        """Raises InputError for anything but a mesh, and for one that is empty, not finite or inside out."""
+        if not isinstance(mesh, trimesh.Trimesh):
+            raise InputError(f"ObjectSurface: {mesh!r} is no mesh; read one with softtact.read_mesh(path, unit='mm').")
+        check_given(mesh)
         self.mesh = mesh
         self._points, self._facets = np.array(mesh.vertices, dtype=float), np.ascontiguousarray(mesh.faces, dtype=np.int64)
         ends = np.stack([self._facets, np.roll(self._facets, -1, axis=1)], axis=2).reshape(-1, 2)

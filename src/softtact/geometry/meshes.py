@@ -85,6 +85,16 @@ def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
     _refuse_overlapping(path, mesh)
 
 
+def check_given(mesh: trimesh.Trimesh, *, name: str = "The object") -> None:
+    """Refuse a mesh in memory whose press would be of something else: without facets, not finite, or closed and inside out."""
+    if not len(mesh.faces):
+        raise InputError(f"{name} has no facets; give a closed mesh in mm.")
+    if not np.isfinite(mesh.vertices).all():
+        raise InputError(f"{name} has corners that are not finite numbers; correct or remove them.")
+    if mesh.is_watertight and mesh.is_winding_consistent and mesh.volume < 0:
+        raise InputError(f"{name} is inside out: its facets' normals point inwards; flip them with mesh.invert().")
+
+
 def folded(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of facets (n, 2) of which one lies on the other, and the middles (n, 3) in mm of their edges.
 

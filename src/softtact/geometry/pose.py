@@ -25,10 +25,12 @@ class Pose:
 
     translation_mm : (3,) in the sensor frame
     rotation : scipy `Rotation`
+    angles_deg : (3,) rx, ry, rz, where the pose was given by them: other angles have the same rotation, but other rates
     """
 
     translation_mm: np.ndarray
     rotation: Rotation = field(default_factory=Rotation.identity)
+    angles_deg: np.ndarray | None = None
 
     @classmethod
     def from_values(cls, values: Sequence[float | str]) -> "Pose":
@@ -42,20 +44,23 @@ class Pose:
             raise InputError(f"The pose {values!r} is not six numbers; write it as {_FORM}.") from None
         if numbers.shape != (6,) or not np.all(np.isfinite(numbers)):
             raise InputError(f"The pose {values!r} is not six finite numbers; write it as {_FORM}.")
-        return cls(numbers[:3], Rotation.from_euler("xyz", numbers[3:], degrees=True))
+        return cls(numbers[:3], Rotation.from_euler("xyz", numbers[3:], degrees=True), numbers[3:])
 
     @classmethod
     def of(cls, value: "Pose | np.ndarray | Sequence[float] | None") -> "Pose | None":
         """The pose of a `Pose`, a 4 x 4 homogeneous matrix or six numbers (`from_values`); None stays None."""
         if value is None or isinstance(value, Pose):
             return value
-        array = np.asarray(value, dtype=float)
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):     # texts, or rows of different lengths
+            raise InputError(f"The pose {value!r} is not six numbers; write it as {_FORM}.") from None
         if array.shape != (4, 4):
             return cls.from_values(array.ravel().tolist())
         turn, last = array[:3, :3], array[3]
-        if not (np.allclose(last, [0, 0, 0, 1]) and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
-            raise InputError(f"The pose {array.tolist()} is no rigid motion: its upper left 3 x 3 must be a rotation and its last "
-                             "row 0, 0, 0, 1; correct it, and scale the mesh by its unit.")
+        if not (np.isfinite(array).all() and np.allclose(last, [0, 0, 0, 1]) and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
+            raise InputError(f"The pose {array.tolist()} is no rigid motion: its upper left 3 x 3 must be a rotation, its last row "
+                             "0, 0, 0, 1 and all numbers finite; correct it, and scale the mesh by its unit.")
         return cls(array[:3, 3], Rotation.from_matrix(turn))
 
     @classmethod
@@ -71,9 +76,10 @@ class Pose:
         """Velocities (6, n, 3) of an object's points (n, 3) in mm, in the sensor frame, by the pose's six numbers (`from_values`).
 
         In mm per mm by x, y, z, and in mm per degree by rx, ry, rz. Where ry is 90 degrees, rx and rz turn about the same axis.
+        A pose without angles has those with ry from -90 to 90 degrees, and there rz = 0.
         """
-        with warnings.catch_warnings(action="ignore", category=UserWarning):      # of that angle, at which rz is taken as 0
-            _, ry, rz = self.rotation.as_euler("xyz")
+        with warnings.catch_warnings(action="ignore", category=UserWarning):      # of that angle
+            _, ry, rz = self.rotation.as_euler("xyz") if self.angles_deg is None else np.radians(self.angles_deg)
         last, middle = Rotation.from_euler("z", rz), Rotation.from_euler("y", ry)
         axes = np.stack([(last * middle).apply([1.0, 0.0, 0.0]), last.apply([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]])
         turned = np.radians(np.cross(axes[:, None], points - self.translation_mm))

@@ -7,7 +7,7 @@ other, and so does the elastic model on sensors that its batch does not serve (`
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -79,12 +79,9 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
     An object that misses the sensor, a pose that is no pose, or a press that does not settle is an error in its place. One warning
     at most, with a count, says that objects rest on the shell. Raises InputError for other faults, such as a force out of range.
     """
-    every = [surfaces] * len(poses) if isinstance(surfaces, ObjectSurface) else list(surfaces)
-    if len(every) != len(poses):
-        raise InputError(f"There are {len(every)} objects and {len(poses)} poses; give one object for each pose, or one object.")
-    forces = np.full(len(poses), force_n, dtype=float) if np.ndim(force_n) == 0 else np.asarray(force_n, dtype=float)
-    if forces.shape != (len(poses),):
-        raise InputError(f"There are {forces.size} forces and {len(poses)} poses; give one force for each pose, or one force.")
+    poses = _listed(poses)
+    every = _objects(surfaces, len(poses))
+    forces = _forces(force_n, len(poses))
     checked_forces(np.unique(forces).tolist(), sensor.spec.force_range_n, sensor.spec.name)
     press: Callable[..., Iterator[Any]]
     if model == "elastic" and together(sensor):
@@ -98,6 +95,38 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
         batch.take(numbers, found)
     warn_of_shells(sensor, batch.arrays["normal_force_n"], batch.arrays["pad_force_n"])
     return batch.finished()
+
+
+def _listed(poses):
+    """The poses as a sequence."""
+    poses = list(poses) if isinstance(poses, Iterable) and not isinstance(poses, str) else [0.0]
+    if any(np.isscalar(pose) for pose in poses):
+        raise InputError("press_batch: the poses are not a list of poses; give an array (n, 6) of x, y, z in mm and rx, ry, rz in "
+                         "degrees, also for one press.")
+    return poses
+
+
+def _objects(surfaces, count):
+    """An `ObjectSurface` for each of `count` poses."""
+    every = list(surfaces) if isinstance(surfaces, Iterable) else [surfaces] * count
+    for one in every:
+        if not isinstance(one, ObjectSurface):
+            raise InputError(f"press_batch: an object is a {type(one).__name__}; give ObjectSurface(mesh), made once for a mesh.")
+    if len(every) != count:
+        raise InputError(f"There are {len(every)} objects and {count} poses; give one object for each pose, or one object.")
+    return every
+
+
+def _forces(force_n, count):
+    """Forces (count,) in N."""
+    try:
+        forces = np.asarray(force_n, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"press_batch: force_n={force_n!r} is not a number, nor a number for each pose; give forces in N.") from None
+    if forces.shape not in ((), (count,)):
+        shown = f"There are {forces.size} forces" if forces.ndim == 1 else f"The forces have the shape {forces.shape}"
+        raise InputError(f"{shown} and {count} poses; give one force for each pose, or one force.")
+    return np.broadcast_to(forces, count)
 
 
 def together(sensor: "Sensor") -> bool:
@@ -161,8 +190,9 @@ class _Batch:
 
 def _pressed_in_turn(sensor, surfaces, poses, forces_n, *, model, device):
     """([number], its result or error) of each press."""
-    if model != "elastic" and device not in ("cpu", "auto"):
-        raise InputError(f"device={device!r}: only the elastic model presses on a GPU; leave it out for the model {model!r}.")
+    if device not in ("cpu", "auto"):
+        raise InputError(f"device={device!r}: only the elastic model presses on a GPU, on sensors whose lower side and sides are "
+                         f"held; leave it out for the model {model!r} on {sensor.spec.name}.")
     for number, (surface, pose, force) in enumerate(zip(surfaces, poses, forces_n, strict=True)):
         with warnings.catch_warnings():      # the batch counts them
             warnings.simplefilter("ignore", ShellWarning)
@@ -219,7 +249,7 @@ def _read(sensor, compliance, numbers, objects, forces_n, device, start):
     seconds = np.full(len(columns), (time.perf_counter() - start) / len(columns))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ShellWarning)
-        result = elastic_result(sensor, press.columns(columns), forces_n[good].ravel(), seconds, touch_mm=touch)
+        result = elastic_result(sensor, press.columns(columns), forces_n[good].ravel(), seconds, touch_mm=touch, presses=len(good))
     yield [numbers[k] for k in good], with_expected_error(sensor, flag_buried(result, top))
 
 

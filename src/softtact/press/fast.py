@@ -171,8 +171,13 @@ def shell_stop_mm(sensor: "Sensor", surface: HeightField) -> float:
     return shell_of(sensor).stop_mm(surface)
 
 
-def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *, touch_mm: float) -> PressResult:
-    """The result of a `LayerPress`; touch_mm: descent of the object to first touch."""
+def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *, touch_mm: float | np.ndarray,
+                   presses: int = 1) -> PressResult:
+    """The result of a `LayerPress`, which may hold the load steps of several presses in turn.
+
+    touch_mm: descent to first touch, of the object or at each load step;  presses: each of as many load steps, is read by itself
+    """
+    felt = np.concatenate([felt_displacement(sensor.spec, one) for one in np.split(press.thinning, presses)])
     contact, unknown = press.contact, np.full(len(forces), np.nan)
     depth = contact.depth - touch_mm
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=depth,
@@ -182,7 +187,7 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
                        flags=flags_elastic(depth, press.fields, thickness_mm=sensor.spec.thickness_mm,
                                            dielectric_mm=sensor.spec.dielectric_thickness_mm),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
-                       felt_mm=felt_displacement(sensor.spec, press.thinning), iterations=contact.iterations)
+                       felt_mm=felt, iterations=contact.iterations)
 
 
 def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, control: RunControl) -> PressResult:

@@ -72,6 +72,9 @@ class Gradient:
 
         cotangent: of the shape of the map (step, row, column), or (step,) of the depth
         """
+        if np.shape(cotangent) != self.values.shape[:-1]:
+            raise InputError(f"vjp: the cotangent has the shape {np.shape(cotangent)}; give {self.values.shape[:-1]}, that of "
+                             f"{self.of}.")
         product: np.ndarray = np.asarray(cotangent)[..., None] * self.values
         return product.sum(axis=tuple(range(1, product.ndim - 1)))
 
@@ -86,6 +89,8 @@ class Origin:
     """The object as it was given, in mm."""
     pose: Pose
     """Its pose in the sensor frame."""
+    mesh_hash: int
+    """Of the mesh when it was pressed."""
 
     @property
     def underside(self) -> HeightField:
@@ -106,8 +111,10 @@ def gradient(result: "PressResult", of: str, by: Sequence[str]) -> Gradient:
 
 def _parameters(of, by):
     """Names of the single parameters in `by`; refuses unknown names and those that have no gradient."""
-    if of not in _OF:
+    if of not in list(_OF):
         raise InputError(f"gradient(of={of!r}): {unknown(of, list(_OF), kind='quantity with a gradient')}")
+    if isinstance(by, int | float | None) or not len(by := list(by)):
+        raise InputError(f"gradient(by={by!r}): name at least one parameter of: {', '.join(['pose', *_UNITS])}.")
     for name in by:
         if name == "friction":
             raise InputError("gradient(by='friction'): a press with friction depends on its whole path, not on the settled contact "
@@ -123,7 +130,10 @@ def _check(result, of):
         raise InputError(f"The {result.model} model has no gradients; press with model='elastic' or 'foundation'.")
     if result.origin is None:
         raise InputError("This result does not know its sensor and object, which a gradient needs: it was read from a file, "
-                         "pressed in a batch, along a motion or over time; press again with Sensor.press and force_n.")
+                         "pressed in a batch, along a motion, over time or on a gel; press again with Sensor.press and force_n.")
+    if hash(result.origin.mesh) != result.origin.mesh_hash:
+        raise InputError("The object's mesh was changed after the press, so its contact is not that of this result any more; press "
+                         "again, and change copies of a mesh.")
     if (untouched := np.flatnonzero(result.pad_force_n <= 0)).size:
         raise InputError(f"At {result.normal_force_n[untouched[0]]:g} N the object rests on the shell and touches nothing of the "
                          "pad, so there is no gradient; give a narrower object, or another pose.")

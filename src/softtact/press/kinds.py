@@ -137,7 +137,7 @@ def _by_forces(sensor, task, press, *, threads=1):
         task, complete = replace(task, motion=slow), partial(at_times, load_step=load_step, effective_n=effective_n, motion=motion)
     forces = checked_forces(task.motion.forces_n, sensor.spec.force_range_n, sensor.spec.name)
     placed, finish = _placed(sensor, task)
-    origin = Origin(sensor, task.pressed, task.pose or default_pose(task.pressed))
+    origin = Origin(sensor, task.pressed, task.pose or default_pose(task.pressed), hash(task.pressed))
 
     def finished(result: PressResult) -> PressResult:
         result = finish(choice.with_expected_error(sensor, result))

@@ -11,7 +11,7 @@ import trimesh
 
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
-from softtact.geometry.meshes import read_mesh
+from softtact.geometry.meshes import check_given, read_mesh
 from softtact.geometry.pose import Pose
 from softtact.press.objects import SoftObject
 from softtact.press.reached import Reached
@@ -130,7 +130,10 @@ def refuse_unknown(options: Mapping[str, Any], known: Any) -> None:
 
 def mesh_of(mesh: trimesh.Trimesh | str | Path, unit: str | None) -> trimesh.Trimesh:
     """A mesh in mm, read where it is the path of a file, which needs a `unit` unless it states one."""
-    return mesh if isinstance(mesh, trimesh.Trimesh) else read_mesh(mesh, unit=unit)
+    if not isinstance(mesh, trimesh.Trimesh):
+        return read_mesh(mesh, unit=unit)
+    check_given(mesh)
+    return mesh
 
 
 def motion_of(spec: "Specification", force_n: float | Sequence[float] | None, motion: Motion | str | None) -> Motion:
