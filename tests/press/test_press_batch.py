@@ -78,12 +78,12 @@ def test_rows_do_not_depend_on_the_others_of_their_batch(sensor, monkeypatch):
 
 def test_a_press_is_read_as_if_it_were_alone_whatever_presses_beside_it(sensor):
     """The readout inverts by a table down to the highest point of the bulge: that of a deep pin is another one."""
-    ball, pin = (BALL, (0, 0, 0, 0, 0, 0), 20.0), (trimesh.creation.cylinder(radius=0.4, height=12.0), (0, 0, 6, 0, 0, 0), 50.0)
+    ball, pin = (BALL, (0, 0, 0, 0, 0, 0), 0.003), (trimesh.creation.cylinder(radius=0.4, height=12.0), (0, 0, 6, 0, 0, 0), 50.0)
     one, beside = (pressed(sensor, jobs) for jobs in ([ball], [ball, pin]))
-    np.testing.assert_allclose(beside.thinning_map_mm[0], one.thinning_map_mm[0], rtol=0, atol=1e-6)
-    several = [sensor.press_many([BALL, *others], [ball[1]] * (1 + len(others)), force_n=[1.0, 20.0], model="elastic", workers=1,
+    np.testing.assert_allclose(beside.thinning_map_mm[0], one.thinning_map_mm[0], rtol=0, atol=5e-9)     # else 3e-8
+    several = [sensor.press_many([BALL, *others], [ball[1]] * (1 + len(others)), force_n=[0.003, 50.0], model="elastic", workers=1,
                                  label="")[0] for others in ([], [pin[0]])]
-    np.testing.assert_allclose(several[1].thinning_map_mm, several[0].thinning_map_mm, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(several[1].thinning_map_mm[0], several[0].thinning_map_mm[0], rtol=0, atol=5e-9)
 
 
 def test_a_press_that_cannot_be_made_has_its_sentence_and_leaves_the_others(sensor):
