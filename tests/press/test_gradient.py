@@ -194,7 +194,8 @@ def test_a_result_refers_to_its_sensor_and_object_in_this_process_only(sensor):
     ("force", "pose", "there is no quantity with a gradient 'force'"),
     ("depth", "posse", "there is no parameter with a gradient 'posse'; did you mean 'pose'"),
     (["depth"], "x", "there is no quantity with a gradient"), ("depth", [], "name at least one parameter of: pose, x"),
-    ("depth", None, "name at least one parameter"), ("depth", ["x", "friction"], "a press with friction depends on its whole path")])
+    ("depth", None, "name at least one parameter"),
+    ("depth", ["x", "friction"], "a press with friction depends on its whole path")])
 def test_unknown_names_are_refused(sensor, of, by, sentence):
     with pytest.raises(InputError, match=sentence):
         pressed(sensor).gradient(of, by)

@@ -130,7 +130,7 @@ def test_wrong_counts_forces_and_models_are_refused(sensor):
     (ObjectSurface(PUNCH), np.zeros(6), 4.0, "the poses are not a list of poses"),
     (ObjectSurface(PUNCH), None, 4.0, "the poses are not a list of poses"),
     (ObjectSurface(PUNCH), "0,0,0,0,0,0", 4.0, "the poses are not a list of poses"),
-    (ObjectSurface(PUNCH), np.zeros((2, 6)), "much", "force_n='much' is not a number"),
+    (ObjectSurface(PUNCH), np.zeros((2, 6)), "much", "force_n='much' is no number"),
     (ObjectSurface(PUNCH), np.zeros((2, 6)), np.ones((2, 1)), r"The forces have the shape \(2, 1\) and 2 poses"),
     (PUNCH, np.zeros((2, 6)), 4.0, "an object is a Trimesh; give ObjectSurface"),
     ([PUNCH] * 2, np.zeros((2, 6)), 4.0, "an object is a Trimesh; give ObjectSurface"),

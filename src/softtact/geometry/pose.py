@@ -58,7 +58,8 @@ class Pose:
         if array.shape != (4, 4):
             return cls.from_values(array.ravel().tolist())
         turn, last = array[:3, :3], array[3]
-        if not (np.isfinite(array).all() and np.allclose(last, [0, 0, 0, 1]) and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
+        rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0
+        if not (np.isfinite(array).all() and np.allclose(last, [0, 0, 0, 1]) and rigid):
             raise InputError(f"The pose {array.tolist()} is no rigid motion: its upper left 3 x 3 must be a rotation, its last row "
                              "0, 0, 0, 1 and all numbers finite; correct it, and scale the mesh by its unit.")
         return cls(array[:3, 3], Rotation.from_matrix(turn))

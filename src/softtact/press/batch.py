@@ -122,7 +122,7 @@ def _forces(force_n, count):
     try:
         forces = np.asarray(force_n, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"press_batch: force_n={force_n!r} is not a number, nor a number for each pose; give forces in N.") from None
+        raise InputError(f"press_batch: force_n={force_n!r} is no number, nor one for each pose; give forces in N.") from None
     if forces.shape not in ((), (count,)):
         shown = f"There are {forces.size} forces" if forces.ndim == 1 else f"The forces have the shape {forces.shape}"
         raise InputError(f"{shown} and {count} poses; give one force for each pose, or one force.")
