@@ -23,6 +23,8 @@ BOX = '<body name="box" pos="{x} {y} {z}"><freejoint/><geom type="box" size=".00
 NO_CONTACT = 'contype="0" conaffinity="0"'
 BALL = '<body name="ball" pos="-.005 -.012 .0061"><freejoint/><geom type="sphere" size=".006" mass=".2"/></body>'
 
+WITH_FOOT = """<body name="tool" pos="0 0 .0101"><freejoint/><geom type="box" size=".002 .002 .01" pos="-.005 0 0" mass=".2"/><body
+  pos=".005 0 .01" euler="0 90 0"><body><geom type="box" size=".01 .002 .002" pos=".01 0 0" mass=".2"/></body></body></body>"""
 
 HAND = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body name="palm" pos="0 0 .2">
   <geom type="box" size=".06 .02 .01" pos="0 0 .06" contype="0" conaffinity="0"/>
@@ -96,6 +98,36 @@ def test_several_objects_are_read_beside_each_other(coro):
     pressing = {name: -force[2] for name, force in reading.objects.items()}
     assert pressing == pytest.approx({"box": 0.5 * G, "ball": 0.2 * G}, rel=0.02)
     assert reading.tactile_map[0:2, 0].sum() > 50 and reading.tactile_map[4:, 2:].sum() > 50
+
+
+def test_a_box_that_the_engine_holds_off_by_a_margin_presses_with_its_weight(coro):
+    spec = mujoco.MjSpec.from_string(scene(box(0.5, z=0.014).replace("mass", 'margin=".004" mass')))
+    sensor = attach(spec, "plate", coro)
+    assert -sensor.read(settled(spec.compile())).force_n[2] == pytest.approx(0.5 * G, rel=0.02)
+
+
+def test_bodies_fixed_to_an_object_press_with_it(coro):
+    read = {}
+    for source, collides in (("contacts", ""), ("poses", NO_CONTACT)):
+        spec = mujoco.MjSpec.from_string(scene(WITH_FOOT, collides=collides))
+        sensor = attach(spec, "plate", coro, source=source)
+        data = settled(spec.compile(), sensors=[sensor] if source == "poses" else ())
+        read[source] = sensor.read(data)
+        assert {name: -force[2] for name, force in read[source].objects.items()} == pytest.approx({"tool": 0.4 * G}, rel=0.02)
+    maps = [one.deformation_map_mm for one in read.values()]
+    assert np.abs(maps[0] - maps[1]).max() < 0.03 * maps[0].max()
+
+
+@pytest.mark.parametrize("joint", ["", "<joint type='slide'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"])
+def test_a_free_base_that_carries_the_sensor_is_no_object(coro, joint):
+    hand = f'<body name="hand">{joint}</body>'
+    base = f'<body name="base"><freejoint/><inertial pos="0 0 0" mass="9" diaginertia="1 1 1"/>{hand}</body>'
+    spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{base}{box(z=0.0099)}</worldbody></mujoco>")
+    sensor = attach(spec, "hand", coro, source="poses")
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert list(sensor.read(data).objects) == ["box"]
 
 
 def test_only_named_objects_count(coro):
@@ -215,12 +247,22 @@ def test_a_scene_that_begins_again_forgets_its_contacts(coro):
     ({"press": "foundation", "source": "poses"}, "press='foundation': a sensor in a scene"),
     ({"objects": ["world"]}, "The body 'world' has a geom of type 'plane', which a sensor cannot press; use a box"),
     ({"objects": ["bare"]}, "The body 'bare' has no geom that a sensor can press"),
-    ({"friction": -1.0}, "friction=-1.0: give a finite number"),
+    ({"objects": "box"}, r"objects='box': give a list of names, such as \['box'\]"),
+    ({"objects": ["plate"]}, "objects: 'plate' carries the sensor"),
+    ({"friction": -1.0}, "friction=-1.0: give a finite number of at least 0"),
     ({"sensor": "gelsight_mini", "source": "poses"}, "source='poses': gelsight_mini is a gel, which follows contact forces alone")])
 def test_what_cannot_be_attached_is_refused_in_one_sentence(coro, given, sentence):
     text = scene(box() + '<body name="bare"/>' + '<geom type="plane" size="1 1 1" pos="0 0 -.1"/>')
     with pytest.raises(InputError, match=sentence):
         attach(mujoco.MjModel.from_xml_string(text), **{"body": "plate", "sensor": coro, "pose": [0, 0, -2.5, 0, 0, 0]} | given)
+
+
+def test_what_is_no_scene_and_no_state_is_refused_in_one_sentence(coro):
+    with pytest.raises(InputError, match="attach: the scene is a mujoco.MjSpec or MjModel, not str; read a file with"):
+        attach("scene.xml", "plate", coro)
+    model = mujoco.MjModel.from_xml_string(scene(box()))
+    with pytest.raises(InputError, match="A sensor is read from a mujoco.MjData, not from MjModel"):
+        attach(model, "plate", coro, pose=[0, 0, -2.5, 0, 0, 0]).read(model)
 
 
 def test_a_force_that_the_engine_gives_already_is_not_given_again(coro):

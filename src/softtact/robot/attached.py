@@ -32,7 +32,7 @@ from softtact.press.sensor import Sensor, load_sensor
 from softtact.readout.registry import readings_of
 from softtact.robot.events import set_down
 from softtact.robot.gels import GelReadings, has_gel
-from softtact.robot.geoms import MM, body_mesh, contact_force, contacts_of, geoms_of, name_of, pose_of_frame
+from softtact.robot.geoms import MM, body_mesh, contact_force, contacts_of, geoms_of, name_of, pose_of_frame, rigid_body_of
 from softtact.robot.scene import PAD_COLOUR, PAD_CONTACT, TORSION_M
 from softtact.robot.settings import number
 
@@ -86,6 +86,9 @@ def attach(model: Any, body: str, sensor: Sensor | str, *, pose: Pose | Sequence
     sensor's own
     Raises InputError for a body that the scene lacks, a frame that points into the body, an object that cannot be pressed.
     """
+    if not isinstance(model, mujoco.MjModel | mujoco.MjSpec):
+        raise InputError(f"attach: the scene is a mujoco.MjSpec or MjModel, not {type(model).__name__}; read a file with "
+                         "mujoco.MjSpec.from_file.")
     sensor = load_sensor(sensor) if isinstance(sensor, str) else sensor
     _check_sensor(sensor, source, press)
     if friction is not None:
@@ -96,8 +99,7 @@ def attach(model: Any, body: str, sensor: Sensor | str, *, pose: Pose | Sequence
     place_on = _frame(compiled, here, pose)
     attached = AttachedSensor(sensor, body, place_on, source, press, None if objects is None else tuple(objects))
     _refuse_frame_into_body(compiled, here, place_on, sensor.spec)
-    for name in objects or ():
-        body_mesh(compiled, _body_of(compiled, name))
+    _check_objects(compiled, here, objects)
     if added:
         _add_pad(model, body, place_on, attached, friction)
     return attached
@@ -144,9 +146,9 @@ class AttachedSensor:
         low = np.array([*(-0.5 * np.asarray(self.sensor.spec.footprint_mm) - _RIM_MM), -self.sensor.spec.thickness_mm])
         forces: dict[int, np.ndarray] = {}
         for contact, _, other, sign in contacts_of(data, self.geoms(data)):
-            body = int(model.geom_bodyid[other])
+            body, gap = self.object_of(int(model.geom_bodyid[other])), max(data.contact[contact].dist, 0.0) / MM
             at = turn.inv().apply(data.contact[contact].pos / MM - origin)
-            on_sensor = (at >= low).all() and (at <= [*-low[:2], _OVER_MM]).all()
+            on_sensor = (at >= low).all() and (at <= [*-low[:2], _OVER_MM + gap]).all()
             if on_sensor and (self.objects is None or body in self._named):
                 force = turn.inv().apply(contact_force(model, data, contact, sign))
                 forces[body] = forces.get(body, np.zeros(3)) + force
@@ -202,6 +204,10 @@ class AttachedSensor:
         self._bind(data)
         return self._named
 
+    def object_of(self, body: int) -> int:
+        """The object that a body belongs to: itself where it is named, else the one that it is fixed to."""
+        return body if body in self._named else rigid_body_of(self._model, body)
+
     def geoms(self, data: Any) -> set[int]:
         """Numbers of the geoms of the sensor's body that the engine collides."""
         self._bind(data)
@@ -209,6 +215,8 @@ class AttachedSensor:
 
     def _bind(self, data):
         """Find body, geoms and objects in a model at its first state; forget contacts where the time goes back."""
+        if not isinstance(data, mujoco.MjData):
+            raise InputError(f"A sensor is read from a mujoco.MjData, not from {type(data).__name__}.")
         if model_is_new := data.model is not self._model:
             self._find(data.model)
         if model_is_new or data.time < self._time:
@@ -221,7 +229,8 @@ class AttachedSensor:
         self._model, self._body = model, _body_of(model, self.body)
         self._geoms = {int(geom) for geom in geoms_of(model, self._body)}
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
-        self._named = [int(body) for body in free if body != self._body and self.source == "poses"]
+        carrier = rigid_body_of(model, self._body)
+        self._named = [int(body) for body in free if body != carrier and self.source == "poses" and _has_geoms(model, body)]
         if self.objects is not None:
             self._named = [_body_of(model, name) for name in self.objects]
         self._reach = {body: np.linalg.norm(self._mesh(body).vertices, axis=1).max() for body in self._named}
@@ -313,6 +322,21 @@ def _check_sensor(sensor, source, press):
     if source == "poses" and has_gel(sensor):
         raise InputError(f"source='poses': {sensor.spec.name} is a gel, which follows contact forces alone; use 'contacts'.")
     sensor.spec.check_for(press)
+
+
+def _check_objects(model, here, objects):
+    """Raise InputError for objects that cannot be pressed, or that are the sensor's own body."""
+    if isinstance(objects, str):
+        raise InputError(f"objects={objects!r}: give a list of names, such as [{objects!r}].")
+    for name in objects or ():
+        body_mesh(model, body := _body_of(model, name))
+        if rigid_body_of(model, body) == rigid_body_of(model, here):
+            raise InputError(f"objects: {name!r} carries the sensor; name the bodies that touch it.")
+
+
+def _has_geoms(model, body):
+    """Whether a body, or one fixed to it, has a geom."""
+    return bool((model.body_weldid[model.geom_bodyid] == body).any())
 
 
 def _body_of(model, name):

@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
+from softtact.geometry.meshes import place
+from softtact.geometry.pose import Pose
 
 MM = 1e-3
 # A ball of 10 mm of so many facets lies within 2 um of a sphere; so does a round side of so many sections.
@@ -50,17 +52,34 @@ def geoms_of(model: Any, body: int) -> np.ndarray:
     return geoms[collide] if collide.any() else geoms
 
 
+def rigid_body_of(model: Any, body: int) -> int:
+    """The body that a body is fixed to, through any number of bodies without joints; itself where that is the world."""
+    return int(model.body_weldid[body]) or body
+
+
 def body_mesh(model: Any, body: int) -> trimesh.Trimesh:
-    """The geoms of a body (`geoms_of`) in one mesh in mm, in the body's frame.
+    """The geoms of a body (`geoms_of`) and of the bodies fixed to it in one mesh in mm, in the body's frame.
 
     They may overlap: a sensor touches their lower envelope. Meshes are the true ones, not their convex hulls.
     Raises InputError for a body without geoms, and for a plane or a height field, which have no sides.
     """
-    parts = [_geom_mesh(model, body, geom) for geom in geoms_of(model, body)]
+    parts = [place(_geom_mesh(model, one, geom), pose=pose)
+             for one, pose in _fixed_to(model, body) for geom in geoms_of(model, one)]
     if not parts:
         raise InputError(f"The body {name_of(model, body)!r} has no geom that a sensor can press; give it one, or leave it out of "
                          "'objects'.")
     return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
+
+
+def _fixed_to(model, body):
+    """(number, pose in the body's frame) of a body and of those that hang on it without a joint."""
+    found = {body: Pose(np.zeros(3))}
+    for one in range(body + 1, model.nbody if body else 0):     # a parent has a lower number than its children
+        parent = found.get(int(model.body_parentid[one]))
+        if parent is not None and model.body_weldid[one] == model.body_weldid[body]:
+            turn = Rotation.from_quat(model.body_quat[one], scalar_first=True)
+            found[one] = Pose(parent.apply(model.body_pos[[one]] / MM)[0], parent.rotation * turn)
+    return found.items()
 
 
 def _geom_mesh(model, body, geom):
@@ -82,12 +101,15 @@ def _geom_mesh(model, body, geom):
 
 
 def contacts_of(data: Any, geoms: Collection[int]) -> Iterator[tuple[int, int, int, float]]:
-    """(number of the contact, geom of `geoms`, other geom, sign) of each contact of geoms that touch.
+    """(number of the contact, geom of `geoms`, other geom, sign) of each contact through which geoms can press each other.
+
+    With a margin geoms press before they touch.
 
     sign: of MuJoCo's force on the geom of `geoms`, as it acts on the second of a pair
     """
-    for number, ((first, second), distance) in enumerate(zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True)):
-        if distance > 0 or (first in geoms) == (second in geoms):
+    pairs, rows = data.contact.geom.tolist(), data.contact.efc_address.tolist()
+    for number, ((first, second), row) in enumerate(zip(pairs, rows, strict=True)):
+        if row < 0 or (first in geoms) == (second in geoms):
             continue
         yield (number, second, first, 1.0) if second in geoms else (number, first, second, -1.0)
 

@@ -88,7 +88,7 @@ def number(name: str, value: Any, *, low: float = -math.inf, high: float = math.
     except (TypeError, ValueError):
         found = math.nan
     if not (math.isfinite(found) and low <= found <= high):
-        limits = f" from {low:g} to {high:g}" if math.isfinite(high) else ""
+        limits = f" from {low:g} to {high:g}" if math.isfinite(high) else f" of at least {low:g}" if math.isfinite(low) else ""
         raise InputError(f"{name}={value!r}: give a finite number{limits}{f' ({unit})' * bool(unit)}.")
     return found
 
