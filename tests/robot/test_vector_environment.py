@@ -115,7 +115,8 @@ def test_a_wrong_number_of_hands_is_refused(count):
 
 
 @pytest.mark.parametrize(("actions", "sentence"), [
-    (np.zeros((3, 3)), "step: 3 actions for 2 hands; give one for each"),
+    (np.zeros((3, 3)), "step: 3 actions for 2 hands; give one for each"), (1.0, "step: the actions are 1.0; give an array"),
+    (None, "step: the actions are None; give an array"),
     (np.array([[0.0, 0, 0], [0, np.nan, 0]]), "step: the action .* is not three finite numbers")])
 def test_wrong_actions_are_refused_and_no_hand_moves(batch, actions, sentence):
     batch.reset(seed=1)
@@ -126,7 +127,21 @@ def test_wrong_actions_are_refused_and_no_hand_moves(batch, actions, sentence):
 
 @pytest.mark.parametrize(("given", "sentence"), [
     ({"seed": [1]}, "reset: 1 seeds for 2 hands"), ({"options": {"reset_mask": np.ones(3, bool)}}, "reset_mask has the shape"),
-    ({"options": {"x": 1.0}}, "reset: the option 'x' is unknown")])
+    ({"options": {"x": 1.0}}, "reset: the option 'x' is unknown"), ({"options": "x"}, "reset: the options are 'x'; give a dict"),
+    ({"options": {"reset_mask": np.zeros(2, bool)}}, "reset_mask names no hand"), ({"seed": -1}, "the seed -1 is no whole number"),
+    ({"seed": 1.5}, "the seed 1.5 is no whole number"), ({"seed": [1, "a"]}, "the seed 'a' is no whole number")])
 def test_a_wrong_reset_is_refused(batch, given, sentence):
     with pytest.raises(InputError, match=sentence):
         batch.reset(**given)
+
+
+@pytest.mark.parametrize("steps", [0, -2, 2.5, "9", True])
+def test_a_wrong_length_of_episodes_is_refused(steps):
+    with pytest.raises(InputError, match="max_episode_steps=.*: give a whole number from 1 on"):
+        make("vector_entry_point", max_episode_steps=steps)
+
+
+def test_seeds_may_be_numbers_of_numpy(batch):
+    wanted = batch.reset(seed=4)[0]["object_pose"]
+    for seed in (np.int64(4), np.array([4, 5]), (4, np.int32(5))):
+        np.testing.assert_array_equal(batch.reset(seed=seed)[0]["object_pose"], wanted)

@@ -32,10 +32,12 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
     def __init__(self, num_envs: int = 1, *, max_episode_steps: int | None = None, **options: Any) -> None:
         """num_envs: of hands;  max_episode_steps: after which an episode is cut;  options: those of `GraspEnv`
 
-        Raises InputError for another number than one from 1 on, and as `GraspEnv` does.
+        Raises InputError for other numbers than whole ones from 1 on, and as `GraspEnv` does.
         """
-        if isinstance(num_envs, bool) or not isinstance(num_envs, int | np.integer) or num_envs < 1:
+        if not _whole(num_envs, 1):
             raise InputError(f"num_envs={num_envs!r}: give a whole number from 1 on.")
+        if max_episode_steps is not None and not _whole(max_episode_steps, 1):
+            raise InputError(f"max_episode_steps={max_episode_steps!r}: give a whole number from 1 on, or leave it out.")
         first = GraspEnv(**options)
         self._hands = [first, *(first.beside() for _ in range(num_envs - 1))]
         self.num_envs, self.render_mode, self._longest = int(num_envs), first.render_mode, max_episode_steps
@@ -53,14 +55,15 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
 
         seed: of the first hand, the others count on from it; or one for each
         """
+        if not isinstance(options, dict | None):
+            raise InputError(f"reset: the options are {options!r}; give a dictionary, or leave them out.")
         given = dict(options or {})
         mask = np.asarray(given.pop("reset_mask", np.ones(self.num_envs, dtype=bool)))
         if mask.shape != (self.num_envs,) or mask.dtype != bool:
             raise InputError(f"reset: the option reset_mask has the shape {mask.shape}; give {self.num_envs} times True or False.")
-        seeds = [None if seed is None else seed + number for number in range(self.num_envs)] \
-            if seed is None or isinstance(seed, int | np.integer) else list(seed)
-        if len(seeds) != self.num_envs:
-            raise InputError(f"reset: {len(seeds)} seeds for {self.num_envs} hands; give one for each, or one number.")
+        if not mask.any():
+            raise InputError("reset: the option reset_mask names no hand; give True for at least one.")
+        seeds = _seeds(seed, self.num_envs)
         for hand in np.flatnonzero(mask):
             self._hands[hand].begin(seed=seeds[hand], options=given)
         self._steps[mask], self._over[mask] = 0, False
@@ -68,6 +71,8 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
 
     def step(self, actions: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Ten milliseconds of all scenes; actions (n, 3)."""
+        if np.ndim(actions) == 0:
+            raise InputError(f"step: the actions are {actions!r}; give an array ({self.num_envs}, 3).")
         if len(actions) != self.num_envs:
             raise InputError(f"step: {len(actions)} actions for {self.num_envs} hands; give one for each.")
         checked = [three_numbers(action) for action in actions]     # before any hand moves
@@ -115,3 +120,20 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
             kept[numbers] = values
             self._seen[name] = kept
         return {name: self._seen[name].copy() for name in self.single_observation_space.spaces}, infos
+
+
+def _whole(number, least):
+    return isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= least
+
+
+def _seeds(seed, count):
+    """A seed, or None, for each of `count` hands, from None, one number, or one for each."""
+    each = list(seed) if isinstance(seed, Sequence | np.ndarray) else [seed]
+    for one in each:
+        if one is not None and not _whole(one, 0):
+            raise InputError(f"reset: the seed {one!r} is no whole number from 0 on.")
+    if not isinstance(seed, Sequence | np.ndarray):
+        each = [None if seed is None else seed + number for number in range(count)]
+    if len(each) != count:
+        raise InputError(f"reset: {len(each)} seeds for {count} hands; give one for each, or one number.")
+    return [None if one is None else int(one) for one in each]     # gymnasium takes no number of numpy
