@@ -86,6 +86,15 @@ def test_a_press_is_read_as_if_it_were_alone_whatever_presses_beside_it(sensor):
     np.testing.assert_allclose(several[1].thinning_map_mm[0], several[0].thinning_map_mm[0], rtol=0, atol=5e-9)
 
 
+def test_a_part_just_beside_the_pad_presses_nothing_of_it(sensor):
+    """A pin over the shell, 0.07 mm beside the pad's side and deeper than the ball on its middle."""
+    pin = trimesh.creation.box((0.1, 0.1, 4.0)).apply_translation((3.72, 0.15, -2.2))
+    ball, both = ((mesh, (0, 0, 0, 0, 0, 0), 0.5) for mesh in (BALL, trimesh.util.concatenate([BALL, pin])))
+    wanted = alone(sensor, *ball).deformation_map_mm[0]
+    for found in (alone(sensor, *both).deformation_map_mm[0], pressed(sensor, [both]).deformation_map_mm[0]):
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=SAME_MM)
+
+
 def test_a_press_that_cannot_be_made_has_its_sentence_and_leaves_the_others(sensor):
     jobs = [JOBS[0], (PUNCH, (50, 0, 1, 0, 0, 0), 4.0), (PUNCH, (0, 0, 1, np.nan, 0, 0), 4.0), (PUNCH, (0, 0, "x", 0, 0, 0), 4.0),
             JOBS[1]]

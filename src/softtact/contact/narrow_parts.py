@@ -31,12 +31,18 @@ def lowest_missed(surface: HeightField, grid: "NodeGrid", gap_mm: np.ndarray, be
     return lowest
 
 
+def margin(grid: "NodeGrid") -> float:
+    """How far beside the outer nodes, in steps, a part still touches: not at all where these lie on the sensor's sides."""
+    return 0.0 if grid.sides else 0.5
+
+
 def along_edges_over(surface: HeightField, grid: "NodeGrid", below_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (k, 3) along the edges of an object's facets below a height, over a grid; and the node (k,) nearest to each."""
     points = surface.along_edges(below_mm, SPACING * grid.step.min())
     last = np.array(grid.shape[::-1]) - 1
     place = (points[:, :2] - grid.points[0]) / grid.step
-    inside = ((place > -0.5) & (place < last + 0.5)).all(axis=1)
+    beside = margin(grid)
+    inside = ((place >= -beside) & (place <= last + beside)).all(axis=1)
     i, j = np.rint(place[inside]).astype(int).T
     return points[inside], j * grid.shape[1] + i
 

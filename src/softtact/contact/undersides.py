@@ -13,7 +13,7 @@ import trimesh
 
 from softtact.compiled import compiled
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.contact.narrow_parts import SEEN, SPACING
+from softtact.contact.narrow_parts import SEEN, SPACING, margin
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
 from softtact.contact.underside import Underside
@@ -80,7 +80,7 @@ class Target:
     def arrays(self) -> tuple:
         """The target as the compiled function takes it."""
         return (self.grid.x, self.grid.y, np.asarray(self.x_mm, dtype=float), np.asarray(self.y_mm, dtype=float),
-                self.shell.boxes, SPACING * self.grid.step.min(), self.reach_mm)
+                self.shell.boxes, SPACING * self.grid.step.min(), margin(self.grid), self.reach_mm)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def undersides(surfaces: Sequence[ObjectSurface], poses: Sequence[Pose | None],
 
 
 @compiled
-def _underside(points, facets, edges, x, y, map_x, map_y, boxes, spacing, reach):
+def _underside(points, facets, edges, x, y, map_x, map_y, boxes, spacing, beside, reach):
     """Heights (n,) over the nodes of lines x, y with parts between nodes, first touch, and the lowest height over the shell."""
     facing, lowest = _facing_down(points, facets), np.full(len(y) * len(x), NO_CONTACT_MM)
     on_map = np.full(len(map_y) * len(map_x), NO_CONTACT_MM)
@@ -126,7 +126,7 @@ def _underside(points, facets, edges, x, y, map_x, map_y, boxes, spacing, reach)
             for b in range(len(boxes)):
                 shell = min(shell, _lowest_in_box(points, facets[t], boxes[b]))
     below = min(touch, lowest.min()) + reach
-    _lower_to_missed(lowest, points, facets, facing, edges, x, y, spacing, below)
+    _lower_to_missed(lowest, points, facets, facing, edges, x, y, spacing, beside, below)
     for n in range(len(lowest)):
         if lowest[n] >= below:
             lowest[n] = NO_CONTACT_MM
@@ -168,7 +168,7 @@ def _lower_to_facets(lowest, points, facets, facing, x, y):
 
 
 @compiled
-def _lower_to_missed(lowest, points, facets, facing, edges, x, y, spacing, below):
+def _lower_to_missed(lowest, points, facets, facing, edges, x, y, spacing, beside, below):
     """Lower the heights over the nodes nearest to parts of the object that no node sees: `lowest_missed`, on the same points."""
     seen, done = lowest.copy(), np.zeros(edges.max() + 1, dtype=np.bool_)
     for t in range(len(facets)):
@@ -180,15 +180,15 @@ def _lower_to_missed(lowest, points, facets, facing, edges, x, y, spacing, below
                 a, b = points[facets[t, k]], points[facets[t, (k + 1) % 3]]
                 parts = max(1, int(np.ceil(np.hypot(b[0] - a[0], b[1] - a[1]) / spacing)))
                 for part in range(parts + 1):
-                    _lower_to_point(lowest, seen, a, b, part / parts, x, y, below)
+                    _lower_to_point(lowest, seen, a, b, part / parts, x, y, beside, below)
 
 
 @compiled(inline="always")
-def _lower_to_point(lowest, seen, a, b, share, x, y, below):
+def _lower_to_point(lowest, seen, a, b, share, x, y, beside, below):
     height, nx, ny = a[2] + share * (b[2] - a[2]), len(x), len(y)
     step_x, step_y = x[1] - x[0], y[1] - y[0]
     u, v = (a[0] + share * (b[0] - a[0]) - x[0]) / step_x, (a[1] + share * (b[1] - a[1]) - y[0]) / step_y
-    if height < below and -0.5 < u < nx - 0.5 and -0.5 < v < ny - 0.5:
+    if height < below and -beside <= u <= nx - 1 + beside and -beside <= v <= ny - 1 + beside:
         found = False
         for corner in range(4):
             i, j = min(max(int(np.floor(u)) + corner % 2, 0), nx - 1), min(max(int(np.floor(v)) + corner // 2, 0), ny - 1)
