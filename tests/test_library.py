@@ -173,6 +173,17 @@ def test_a_picture_needs_the_extra_and_its_lack_is_told_before_the_press(tmp_pat
     common.check_pictures(None, None)
 
 
+def test_a_missing_extra_is_told_before_the_presses_of_a_data_set_and_of_a_grasp(tmp_path):
+    trimesh.creation.box((8, 8, 4)).export(tmp_path / "part.stl")
+    part = [str(tmp_path / "part.stl"), "--unit", "mm", "--out", str(tmp_path / "out")]
+    for package, extra, arguments in (("pyarrow", "lerobot", ["dataset", *part, "--presses", "1", "--format", "lerobot"]),
+                                      ("matplotlib", "plot", ["grasp", *part, "--force", "5"])):
+        status, _, complained = without(package, *arguments)
+        assert status == 1
+        assert f"This needs {package}, which is not installed here; run: pip install 'softtact[{extra}]'" in complained
+        assert not (tmp_path / "out").exists() and not (tmp_path / "out.part").exists()
+
+
 def test_a_gpu_needs_the_extra_and_auto_does_without(tmp_path):
     code = "import sys\nsys.modules['torch'] = None\nfrom softtact import devices\ndevices._has_driver = lambda: True\n"
     status, said, _ = python(f"{code}print(devices.find_device('auto'))")

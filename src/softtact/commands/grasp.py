@@ -11,6 +11,7 @@ from softtact.commands.common import (
     add_repair,
     add_unit,
     check_forces,
+    check_pictures,
     read_object,
     sensor_spec,
     show,
@@ -70,6 +71,7 @@ def _grasp(options):
     from softtact.robot.events import write_events
 
     check_output_folder(options.out)
+    check_pictures(options.out)
     made = _replayed(options) if options.replay else _new(options)
     data, scene, record = made
     events = options.out / "events.nc"

@@ -30,7 +30,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import softtact
-from softtact.errors import InputError, OutputError, SofttactError
+from softtact.errors import InputError, OutputError, SofttactError, require
 from softtact.files import atomic_path, digest, new_hdf5, wait_for_disk, write_dataset
 from softtact.geometry.pose import Pose, draw_poses
 from softtact.learning.lerobot import FPS, same_as, write_lerobot
@@ -122,13 +122,15 @@ def presses_left(path: str | Path, plan: PressPlan) -> int:
 
 
 def check_name(path: Path, form: str) -> None:
-    """Refuse an unknown form, or a name without the form's ending."""
+    """Refuse an unknown form, a name without the form's ending, or a form whose packages are not installed."""
     if form not in FORMATS:
         raise InputError(f"The format {form!r} is unknown; use one of {', '.join(FORMATS)}.")
     if form == "lerobot" and path.suffix:
         raise InputError(f"{path}: the format lerobot is written as a folder; give a name without an ending.")
     if path.suffix.lower() not in FORMATS[form]:
         raise InputError(f"{path}: the format {form} is written as {' or '.join(FORMATS[form])}; give a name with such an ending.")
+    for package in ("pyarrow", "av", "matplotlib") if form == "lerobot" else ():
+        require(package, path)
 
 
 def _refuse_finished(path):
