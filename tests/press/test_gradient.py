@@ -88,14 +88,7 @@ def test_a_gradient_by_the_force_is_the_difference_of_presses_nearby(sensor, tig
 
 
 def test_a_gradient_by_young_is_the_difference_of_stiffer_and_softer_sensors(sensor, tight):
-    young = SMALL.elastic_layer.young_mpa
-
-    def stiffer(by):
-        made = sensor.prepared_models["elastic"]
-        return pressed(replace(sensor, prepared_models={"elastic": replace(made, blocks=ParityBlocks(
-            made.blocks.blocks * young / (young + by)))}))
-
-    wanted = difference(stiffer, 1e-6)
+    wanted = difference(lambda by: pressed(stiffer(sensor, by)), 1e-6)
     for of in ARRAYS:
         assert (error(pressed(sensor).gradient(of, "young")["young"], wanted[of]) < TOLERANCE).all(), of
 
@@ -111,14 +104,15 @@ def uncached(monkeypatch):
     monkeypatch.setattr(gradient, "cached_compliance", elastic.elastic_compliance)
 
 
-@pytest.mark.parametrize("spec", [SMALL, spec_from_dict(PLAIN)], ids=["cover", "only layer"])
+@pytest.mark.parametrize("spec", [SMALL, spec_from_dict(PLAIN), spec_from_dict(PLAIN | {"support": "none"})],
+                         ids=["cover", "only layer", "free below"])
 def test_a_gradient_by_thickness_is_the_difference_of_thicker_and_thinner_sensors(tight, uncached, spec):
     """Differences of second order: counts of a single layer hardly depend on its thickness, and have the largest relative error."""
     def thicker(by):
         return pressed(sensor_in_double(spec.with_upper_layer(spec.upper_layer_mm + by)))
 
     result, wanted = thicker(0.0), difference(thicker, 0.005 * spec.upper_layer_mm)
-    for of, tolerance in {"deformation_map": 1e-4, "depth": 1e-4, "tactile_map": 3e-3}.items():
+    for of, tolerance in {"deformation_map": 2e-4, "depth": 2e-4, "tactile_map": 3e-3}.items():
         assert (error(result.gradient(of, "thickness")["thickness"], wanted[of]) < tolerance).all(), of
 
 
@@ -148,12 +142,25 @@ def test_a_gradient_follows_a_calibrated_readout(sensor, tight):
     assert (error(pressed(known).gradient("tactile_map", "pose")["x"], wanted["tactile_map"]) < TOLERANCE).all()
 
 
-def test_the_active_set_stays_within_the_margin_and_changes_beyond_it(sensor, tight):
+def stiffer(sensor, by):
+    """The sensor with a Young's modulus that is larger by a number of MPa."""
+    made, young = sensor.prepared_models["elastic"], SMALL.elastic_layer.young_mpa
+    softer = ParityBlocks(made.blocks.blocks * young / (young + by))
+    return replace(sensor, prepared_models={"elastic": replace(made, blocks=softer)})
+
+
+@pytest.mark.parametrize("name", ["x", "y", "force", "young"])
+def test_the_active_set_stays_within_the_margin_and_changes_beyond_it(sensor, tight, name):
     result = pressed(sensor)
-    margin = result.gradient("depth", "pose").active_set_margin[0, 0]
+    margin = result.gradient("depth", name).active_set_margin[0, 0]
+
+    def changed(by):
+        if name == "force":
+            return pressed(sensor, forces=np.add(FORCES, by))
+        return pressed(stiffer(sensor, by)) if name == "young" else pressed(sensor, POSE + by * np.eye(6)[POSE_NAMES[name]])
 
     def area(by):
-        return [pressed(sensor, POSE + sign * by * np.eye(6)[0]).contact_area_mm2[0] for sign in (-1, 1)]
+        return [changed(sign * by).contact_area_mm2[0] for sign in (-1, 1)]
 
     assert area(0.98 * margin) == [result.contact_area_mm2[0]] * 2
     assert area(1.02 * margin) != [result.contact_area_mm2[0]] * 2
@@ -162,7 +169,8 @@ def test_the_active_set_stays_within_the_margin_and_changes_beyond_it(sensor, ti
 def test_a_vector_times_the_gradient_is_the_gradient_of_the_product(sensor):
     found = pressed(sensor).gradient("tactile_map", ["pose", "force"])
     weights = np.random.default_rng(1).standard_normal(found.values.shape[:-1])
-    assert found.parameters == ("x", "y", "rx", "ry", "rz", "force") and found.units[-1] == "counts/N"
+    assert found.parameters == ("x", "y", "rx", "ry", "rz", "force") and found.units == (
+        "counts/mm", "counts/mm", *["counts/degree"] * 3, "counts/N")
     np.testing.assert_allclose(found.vjp(weights)[:, 5], (weights * found["force"]).sum(axis=(1, 2)))
 
 

@@ -8,7 +8,8 @@ import trimesh
 from support.sensors import CORO
 
 from softtact.contact.undersides import ObjectSurface
-from softtact.errors import InputError, ShellWarning
+from softtact.errors import ConvergenceError, InputError, ShellWarning
+from softtact.models.elastic.batch import press_layers
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.batch import press_batch
 from softtact.press.sensor import Sensor, load_sensor
@@ -104,6 +105,20 @@ def test_a_press_that_cannot_be_made_has_its_sentence_and_leaves_the_others(sens
     assert "not six numbers" in batch.validity_reason[3]
     assert not batch.deformation_map_mm[1:4].any() and not batch.within_validity[1:4].any()
     np.testing.assert_allclose(batch.deformation_map_mm[[0, 4]], pressed(sensor, JOBS[:2]).deformation_map_mm, rtol=0, atol=SAME_MM)
+
+
+def test_a_press_that_does_not_settle_says_so_and_leaves_the_others(sensor, monkeypatch):
+    def unsettled(*arguments, **options):
+        press = press_layers(*arguments, **options)
+        press.contact.settled[1] = False
+        return press
+
+    wanted = pressed(sensor, JOBS[:3])
+    monkeypatch.setattr("softtact.press.batch.press_layers", unsettled)
+    batch = pressed(sensor, JOBS[:3])
+    assert batch.errors.keys() == {1} and isinstance(batch.errors[1], ConvergenceError)
+    assert "1 N" in batch.validity_reason[1] and not batch.deformation_map_mm[1].any()
+    np.testing.assert_array_equal(batch.deformation_map_mm[[0, 2]], wanted.deformation_map_mm[[0, 2]])
 
 
 def test_a_batch_of_failures_is_a_batch(sensor):

@@ -71,6 +71,17 @@ def test_rates_by_the_force_are_differences_of_balances(pressed, tangent):
     assert_difference(tangent.by_force(), upper, lower, 1e-5)
 
 
+def test_the_active_sets_stay_within_the_margin_and_change_beyond_it(pressed, tangent):
+    margin = tangent.by_force().margin
+
+    def sets(share):
+        contacts = [Tangent.settled(*pressed, FORCE + sign * share * margin).balance.contact for sign in (-1, 1)]
+        return [np.concatenate([one.touching, one.standing]) for one in contacts]
+
+    now = np.concatenate([tangent.balance.contact.touching, tangent.balance.contact.standing])
+    assert all((one == now).all() for one in sets(0.9)) and any((one != now).any() for one in sets(1.1))
+
+
 def stiffer(compliance, factor):
     """The compliance of the same sensor with `factor` times all moduli."""
     law = compliance.law
@@ -120,6 +131,7 @@ def test_a_gradient_of_a_press_is_about_the_difference_of_presses(compliance, by
     for of, name in (("tactile_map", "tactile_map"), ("deformation_map", "deformation_map_mm"), ("depth", "indentation_mm")):
         found, wanted = result.gradient(of, by)[by], (getattr(upper, name) - getattr(lower, name)) / (2 * step)
         assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted) + 2.5e-3 * (of == "depth"), of
+    assert result.gradient("depth", ["young", "force"]).units == ("mm/1", "mm/N")
 
 
 @pytest.mark.slow
