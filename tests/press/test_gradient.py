@@ -112,7 +112,7 @@ def test_a_gradient_by_thickness_is_the_difference_of_thicker_and_thinner_sensor
         return pressed(sensor_in_double(spec.with_upper_layer(spec.upper_layer_mm + by)))
 
     result, wanted = thicker(0.0), difference(thicker, 0.005 * spec.upper_layer_mm)
-    for of, tolerance in {"deformation_map": 2e-4, "depth": 2e-4, "tactile_map": 3e-3}.items():
+    for of, tolerance in {"deformation_map": 5e-4, "depth": 5e-4, "tactile_map": 3e-3}.items():
         assert (error(result.gradient(of, "thickness")["thickness"], wanted[of]) < tolerance).all(), of
 
 
