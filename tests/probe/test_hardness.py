@@ -27,7 +27,7 @@ def test_values_that_overlap_do_not_tell_tissues_apart():
 
 def test_the_page_says_nothing_of_heights_that_were_not_tried():
     both, one = (verdict(table, "index") for table in (TABLE, TABLE[TABLE.tissue_height_mm == 10]))
-    (of_both,), (of_one,) = (list(_on_hardness({"index": asdict(found)})) for found in (both, one))
+    (of_both,), (of_one,) = (list(_on_hardness({"relative_hardness_n_mm": asdict(found)})) for found in (both, one))
     assert "with the tissue's height by up to 20.0%" in of_both and "the 2 heights that were tried" in of_both
     assert "one height of the tissue, which says nothing of others" in of_one and "whatever" not in of_one
 
