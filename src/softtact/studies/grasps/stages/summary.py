@@ -217,5 +217,6 @@ def _result(grasps):
         result.append(f"{invalid} presses at the grip are beyond what their model is valid for: do not rely on their maps.")
     full = int((done[["at_range_end_left", "at_range_end_right"]] > 0).to_numpy().sum()) if len(done) else 0
     if full:
-        result.append(f"Taxels of {full} pad{'s' * (full != 1)} are at the end of the converter's range: they read less than they feel.")
+        result.append(f"Taxels of {full} pad{'s' * (full != 1)} are at the end of the converter's range: they read less than "
+                      "they feel.")
     return result
