@@ -136,6 +136,8 @@ def test_presses_on_the_shell_are_counted_in_one_warning(sensor):
 
 def test_wrong_counts_forces_and_models_are_refused(sensor):
     surface, poses = ObjectSurface(PUNCH), [JOBS[0][1]] * 2
+    with pytest.raises(InputError, match=r"'coro' is a name; give softtact.load_sensor\('coro'\)"):
+        press_batch("coro", surface, poses, 4.0)
     with pytest.raises(InputError, match="3 objects and 2 poses"):
         press_batch(sensor, [surface] * 3, poses, 4.0)
     with pytest.raises(InputError, match="3 forces and 2 poses"):
@@ -151,7 +153,9 @@ def test_wrong_counts_forces_and_models_are_refused(sensor):
 
 
 @pytest.mark.parametrize(("surface", "poses", "force", "sentence"), [
-    (ObjectSurface(PUNCH), np.zeros(6), 4.0, "the poses are not a list of poses"),
+    (ObjectSurface(PUNCH), [0.0] * 6, 4.0, "the poses are not a list of poses"),
+    (ObjectSurface(PUNCH), np.zeros((2, 7)), 4.0, r"the poses have the shape \(2, 7\); give an array \(n, 6\)"),
+    (ObjectSurface(PUNCH), np.zeros(6), 4.0, r"the poses have the shape \(6,\)"),
     (ObjectSurface(PUNCH), None, 4.0, "the poses are not a list of poses"),
     (ObjectSurface(PUNCH), "0,0,0,0,0,0", 4.0, "the poses are not a list of poses"),
     (ObjectSurface(PUNCH), np.zeros((2, 6)), "much", "force_n='much' is no number"),

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,6 +80,8 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
     An object that misses the sensor, a pose that is no pose, or a press that does not settle is an error in its place. One warning
     at most, with a count, says that objects rest on the shell. Raises InputError for other faults, such as a force out of range.
     """
+    if isinstance(sensor, str | Path):
+        raise InputError(f"press_batch: {str(sensor)!r} is a name; give softtact.load_sensor({str(sensor)!r}), loaded once.")
     poses = _listed(poses)
     every = _objects(surfaces, len(poses))
     forces = _forces(force_n, len(poses))
@@ -99,6 +102,9 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
 
 def _listed(poses):
     """The poses as a sequence."""
+    if isinstance(poses, np.ndarray) and poses.shape[1:] != (6,):
+        raise InputError(f"press_batch: the poses have the shape {poses.shape}; give an array (n, 6) of x, y, z in mm and rx, ry, "
+                         "rz in degrees.")
     poses = list(poses) if isinstance(poses, Iterable) and not isinstance(poses, str) else [0.0]
     if any(np.isscalar(pose) for pose in poses):
         raise InputError("press_batch: the poses are not a list of poses; give an array (n, 6) of x, y, z in mm and rx, ry, rz in "
