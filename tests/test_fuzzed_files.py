@@ -102,14 +102,12 @@ def changed(draw, values):
 
 
 
-@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply"])
-def test_a_damaged_mesh_is_refused_by_name_or_read_as_a_closed_body(kind, tmp_path):
-    content = BOX.export(file_type=kind)
-    path = tmp_path / f"mesh.{kind[:3]}"
-    reader = Reader(lambda: read_mended(path, unit="mm"), named=path.name)
+def damaged_objects(path, content, *, unit):
+    """The `Reader` after many damaged copies of an object's file: each is refused by name, or read as a closed body."""
+    reader = Reader(lambda: read_mended(path, unit=unit), named=path.name)
 
     @quick
-    @given(damaged(content if isinstance(content, bytes) else content.encode()))
+    @given(damaged(content))
     def damage(data):
         path.write_bytes(data)
         mended = reader()
@@ -117,6 +115,13 @@ def test_a_damaged_mesh_is_refused_by_name_or_read_as_a_closed_body(kind, tmp_pa
             assert mended.mesh.is_watertight and mended.mesh.volume > 0
 
     damage()
+    return reader
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply"])
+def test_a_damaged_mesh_is_refused_by_name_or_read_as_a_closed_body(kind, tmp_path):
+    content = BOX.export(file_type=kind)
+    reader = damaged_objects(tmp_path / f"mesh.{kind[:3]}", content if isinstance(content, bytes) else content.encode(), unit="mm")
     assert reader.refused >= 10 and reader.taken > 0
 
 
@@ -128,18 +133,7 @@ OBJECTS = {"box.3mf": file_3mf(mesh_3mf(), ONE), "box.amf": file_amf(), "box.glb
 def test_a_damaged_object_of_another_format_is_refused_by_name_or_read_as_a_closed_body(name, tmp_path):
     if name.endswith(".dae"):
         pytest.importorskip("collada", reason="pip install 'softtact[cad]'")
-    path = tmp_path / name
-    reader = Reader(lambda: read_mended(path, unit="mm" if name.endswith((".off", ".zip")) else None), named=path.name)
-
-    @quick
-    @given(damaged(OBJECTS[name]))
-    def damage(data):
-        path.write_bytes(data)
-        mended = reader()
-        if mended is not None:
-            assert mended.mesh.is_watertight and mended.mesh.volume > 0
-
-    damage()
+    reader = damaged_objects(tmp_path / name, OBJECTS[name], unit="mm" if name.endswith((".off", ".zip")) else None)
     assert reader.refused >= 5 and reader.taken > 0
 
 

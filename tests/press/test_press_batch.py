@@ -87,6 +87,17 @@ def test_a_press_is_read_as_if_it_were_alone_whatever_presses_beside_it(sensor):
     np.testing.assert_allclose(several[1].thinning_map_mm[0], several[0].thinning_map_mm[0], rtol=0, atol=5e-9)
 
 
+@pytest.mark.parametrize("side_mm", [SMALL.footprint_mm[0], 40.0])
+@pytest.mark.parametrize("z_mm", [-2.0, 0.0, 2.4, 2.5, 6.0])
+def test_an_object_over_the_whole_pad_is_pressed_from_any_height(sensor, side_mm, z_mm):
+    """All nodes are under it, so that no height says that there is none."""
+    plate = trimesh.creation.box((side_mm, side_mm, 5.0))
+    batch, wanted = pressed(sensor, [(plate, (0, 0, z_mm, 0, 0, 0), 4.0)]), alone(sensor, plate, (0, 0, z_mm, 0, 0, 0), 4.0)
+    assert wanted.deformation_map_mm[0].max() > 0.01
+    np.testing.assert_allclose(batch.deformation_map_mm[0], wanted.deformation_map_mm[0], rtol=0, atol=SAME_MM)
+    assert batch.pad_force_n[0] == pytest.approx(wanted.pad_force_n[0], rel=1e-6)
+
+
 def test_a_part_just_beside_the_pad_presses_nothing_of_it(sensor):
     """A pin over the shell, 0.07 mm beside the pad's side and deeper than the ball on its middle."""
     pin = trimesh.creation.box((0.1, 0.1, 4.0)).apply_translation((3.72, 0.15, -2.2))

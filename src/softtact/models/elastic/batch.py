@@ -18,6 +18,7 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from softtact.compiled import compiled
+from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.node_grid import apply_stencil
 from softtact.contact.undersides import PosedUnderside
 from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps
@@ -208,7 +209,7 @@ def _among(compliance, quarter, heights, forces_n, stops, first, device, setting
     """Arrays by their names in `ContactLoadSteps`, columns first, and `fields`, with contact within a rectangle's quarter alone."""
     surface = _surface_of(compliance, device, quarter)
     areas = compliance.grid.areas(surface.nodes) * surface.real
-    gap0 = np.where(surface.real[:, None], heights.T[surface.nodes], 2 * heights.max())
+    gap0 = np.where(surface.real[:, None], heights.T[surface.nodes], NO_CONTACT_MM)
     press = _Columns(surface, surface.put(gap0), surface.put(forces_n), settings)
     xp = press.xp
     press.start(surface.put(first), surface.put(areas))
