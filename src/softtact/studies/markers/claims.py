@@ -53,7 +53,10 @@ def claims_of_markers(rows: pd.DataFrame, verdicts: pd.DataFrame, facts: dict[st
     rows: scores, a row for each frame;  verdicts: of the sliding test;  facts: of the data set;  weights: {network: number}
     """
     found = [
-        *_in_print(facts, weights),
+        _pairs(facts),
+        *_numbers_in_print(),
+        *_words_in_print(),
+        *_without_lstm(weights),
         *_orders(rows),
         *_of_groups(rows),
         _larger_areas(rows),
@@ -64,9 +67,9 @@ def claims_of_markers(rows: pd.DataFrame, verdicts: pd.DataFrame, facts: dict[st
     return pd.DataFrame(found, columns=COLUMNS)
 
 
-def _in_print(facts: dict[str, Any], weights: dict[str, int]) -> Iterator[dict[str, str]]:
+def _pairs(facts: dict[str, Any]) -> dict[str, str]:
     pairs = 16 * facts["pairs_of_object"]
-    yield row(
+    return row(
         "19,845 pairs of images an object, 318k in all",
         "sec. IV-C",
         "19,845; 318k",
@@ -76,6 +79,9 @@ def _in_print(facts: dict[str, Any], weights: dict[str, int]) -> Iterator[dict[s
         "facts/data.json",
         uncertainty="none: counted",
     )
+
+
+def _numbers_in_print() -> Iterator[dict[str, str]]:
     of_taxim, of_phong = (
         1 - PRINTED_MARKERS["proposed"][0] / PRINTED_MARKERS["Taxim"][0],
         1 - PRINTED_IMAGES["proposed"][1] / PRINTED_IMAGES["Phong"][1],
@@ -90,6 +96,20 @@ def _in_print(facts: dict[str, Any], weights: dict[str, int]) -> Iterator[dict[s
         "tables/claims.csv",
         uncertainty="none: printed numbers",
     )
+    per_marker = PRINTED_MARKERS["proposed"][0] / 64 * MM_PER_PX
+    yield row(
+        "147 px are 0.144 mm a marker",
+        "sec. V-A",
+        "0.144 mm",
+        f"{per_marker:.4f} mm at {MM_PER_PX:g} mm a pixel",
+        CONSISTENT if abs(per_marker - 0.144) < 5e-4 else CONTRADICTION,
+        "147 / 64 markers, scale of the authors' files",
+        "tables/claims.csv",
+        uncertainty="none: printed numbers",
+    )
+
+
+def _words_in_print() -> Iterator[dict[str, str]]:
     yield row(
         "Each patch's number is in [0, 1] owing to tanh",
         "sec. III-B",
@@ -111,17 +131,9 @@ def _in_print(facts: dict[str, Any], weights: dict[str, int]) -> Iterator[dict[s
         "tables/claims.csv",
         uncertainty="none: printed statements",
     )
-    per_marker = PRINTED_MARKERS["proposed"][0] / 64 * MM_PER_PX
-    yield row(
-        "147 px are 0.144 mm a marker",
-        "sec. V-A",
-        "0.144 mm",
-        f"{per_marker:.4f} mm at {MM_PER_PX:g} mm a pixel",
-        CONSISTENT if abs(per_marker - 0.144) < 5e-4 else CONTRADICTION,
-        "147 / 64 markers, scale of the authors' files",
-        "tables/claims.csv",
-        uncertainty="none: printed numbers",
-    )
+
+
+def _without_lstm(weights: dict[str, int]) -> Iterator[dict[str, str]]:
     if "no_lstm" in weights:
         yield row(
             "The 3D-UNet without LSTM refers to earlier frames by its 3-D convolutions",

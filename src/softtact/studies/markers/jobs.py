@@ -222,10 +222,33 @@ class _Jobs:
             table,
             {"sources": self.sources, "trained": list(values.objects.train), "networks": list(values.networks.names)},
         )
-        first, tested = list(values.networks.names), self._tested()
+        drawn, drag = self._drawing(table)
+        page = Job(
+            "report",
+            {
+                **{name: table[name] for name in ("table1", "table2", "by_object", "sliding", "claims")},
+                "manifest": f"{folder}/dataset/manifest.csv",
+                "facts": facts,
+                "drag": f"{folder}/figures/sequences.html",
+                "figures": [str(job.made()["png"]) for job in drawn.values()],
+            },
+            {"page": f"{folder}/report.html"},
+            {
+                "study": self.study.name,
+                "size": values.networks.size,
+                "pixels": self.study.pixels,
+                "config": values.model_dump_json(indent=2),
+            },
+        )
+        return [judged, *drawn.values(), drag, page]
+
+    def _drawing(self, table: dict[str, str]) -> tuple[dict[str, Job], Job]:
+        """The figures, and the page with sequences to drag; table: files of the tables."""
+        folder = self.folder
+        first, tested = list(self.values.networks.names), self._tested()
         generators = [self.generator(name, self.values.networks.seeds[0]) for name in first]
-        shown = {"marker_radius_px": self.study.marker_radius_px, "shown": values.shown}
-        errors = {"sources": self.sources, "trained": list(values.objects.train)}
+        shown = {"marker_radius_px": self.study.marker_radius_px, "shown": self.values.shown}
+        errors = {"sources": self.sources, "trained": list(self.values.objects.train)}
         drawn = {
             "fig7_examples": Job(
                 "draw_examples",
@@ -250,24 +273,7 @@ class _Jobs:
             {"html": f"{folder}/figures/sequences.html"},
             {"network": first[0], **shown},
         )
-        page = Job(
-            "report",
-            {
-                **{name: table[name] for name in ("table1", "table2", "by_object", "sliding", "claims")},
-                "manifest": f"{folder}/dataset/manifest.csv",
-                "facts": facts,
-                "drag": f"{folder}/figures/sequences.html",
-                "figures": [str(job.made()["png"]) for job in drawn.values()],
-            },
-            {"page": f"{folder}/report.html"},
-            {
-                "study": self.study.name,
-                "size": values.networks.size,
-                "pixels": self.study.pixels,
-                "config": values.model_dump_json(indent=2),
-            },
-        )
-        return [judged, *drawn.values(), drag, page]
+        return drawn, drag
 
     def _tested(self) -> list[str]:
         """Files that hold the sequences which figures show: of unseen objects first."""
