@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
+from softtact.fem.elements import HEX27
+from softtact.fem.solid_block import HexBlock
+from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import surface_grid
-from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, element_stiffness
 
 SOFT = LinearLayer(1.0, bulk_modulus=4.0, shear_modulus=0.3)
 STIFF = LinearLayer(1.5, bulk_modulus=0.8, shear_modulus=0.5, shares=(0.6, 0.4))
@@ -88,6 +91,14 @@ def test_the_compliance_is_symmetric_and_positive():
 
 
 # --- mechanics ---
+
+
+@pytest.mark.parametrize("layer", [SOFT, STIFF])
+def test_an_element_is_as_stiff_as_the_nonlinear_one_at_rest(layer):
+    law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
+    size = np.array([0.5, 0.7, 0.2])
+    nonlinear = HexBlock(0.5 * HEX27.nodes[None] * size, law).tangent(np.zeros((1, 27, 3)))[0]
+    np.testing.assert_allclose(element_stiffness(layer, size), nonlinear, rtol=0, atol=1e-14 * nonlinear.max())
 
 
 def test_a_wide_thin_layer_yields_to_even_pressure_as_if_confined():
