@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from softtact.files import read_yaml
 from softtact.reporting.words import in_words
+from softtact.studies.hybrid.mesh_error import MESH_ERRORS, tested_meshes
 
 LEAST_ERROR = "error, 20 um"      # the policy of the expected error that the page holds against the paper's rule
 
@@ -23,23 +25,26 @@ def found(folder: Path, verdicts: pd.Series, run: str) -> list[str]:
     """
     counts = ", ".join(f"{verdict} {count}" for verdict, count in verdicts.value_counts().items())
     sentences = [f"The rules of today make of the {len(verdicts)} claims that were judged: {counts}."]
+    meshes = tested_meshes(read_yaml(folder / "config.yaml", missing="the page names the meshes of the tested models."))
     tables = {path.stem: pd.read_csv(path) for path in sorted(folder.glob("*.csv"))}
     for name, words in (("networks", _networks), ("claims", _difference), ("seeds", _seeds), ("policies", _policies),
                         ("table3_timing", _times)):
         if name in tables:
-            sentences += words(tables[name])
+            sentences += words(tables[name], meshes) if words is _networks else words(tables[name])
     jobs = re.search(r"(\d+) jobs of \d+ stages took (\d+) s", run)
     return sentences + ([f"The run had {jobs[1]} jobs, which took {jobs[2]} s of wall time in all, each counted on its own."]
                         if jobs else [])
 
 
-def _networks(table: pd.DataFrame) -> Iterator[str]:
-    """Scores on grasped objects: the printed network, a compact one, and what needs none."""
+def _networks(table: pd.DataFrame, meshes: dict[str, str]) -> Iterator[str]:
+    """Scores on grasped objects: the printed network, a compact one, and what needs none; meshes: of tested models, by preset."""
     of = {(row.model, row.architecture): row for row in table[table["set"] == "grasps"].itertuples()}
     hyper, elastic = (of.get((model, "printed")) for model in ("hyperelastic", "elastic"))
     if not (hyper and elastic):
         return
-    yield (f"On grasped objects the paper's network reads the virtual sensor from hyperelastic maps with a mean SSIM of "
+    mesh = meshes.get("hyperelastic")
+    off = f" ({mesh} mesh, off by {MESH_ERRORS[mesh].rms} in the root mean square)" if mesh else ""
+    yield (f"On grasped objects the paper's network reads the virtual sensor from hyperelastic maps{off} with a mean SSIM of "
            f"{_ssim(hyper)}, from elastic maps with {_ssim(elastic)}.")
     small = of.get(("hyperelastic", "compact")), of.get(("elastic", "compact"))
     if all(small):

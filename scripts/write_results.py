@@ -34,6 +34,7 @@ from softtact.studies.code_closure import code_closure
 from softtact.studies.hybrid.claims.in_print import claims_in_print
 from softtact.studies.hybrid.claims.of_tests import claims_of_constants
 from softtact.studies.hybrid.claims.of_times import NOT_JUDGED
+from softtact.studies.hybrid.mesh_error import mesh_sentences, with_mesh_error
 from softtact.studies.hybrid.tables import PRINTED_COUNTS, PRINTED_TIMES, machine
 from softtact.studies.jobs import stage_source, stages_of
 
@@ -62,9 +63,10 @@ TABLES = {
     "Time per tactile map": ("tables/table3_timing.csv", None)}
 NOTES = {
     "Policies": "Errors are distances from the study's own hyperelastic presses. That model has 0 by definition: it is the measure "
-                "here and no truth, and the error of its mesh stands among what is missing. The row of a random choice has as many "
+                "here and no truth; the error of its mesh follows. The row of a random choice has as many "
                 "presses of each model as the paper's rule. Times are of one machine, with what else ran there.",
     "Scores of the networks": "Maps are readings of few presses: those of one press differ by noise and drift alone."}
+BY_MESH = ("SSIM against the gain of the readings", "Policies")     # score the tested model in columns or by distance, not in rows
 CLAIMS, GAPS = "tables/claims.csv", "tables/gaps.csv"
 RULES = ("src/softtact/studies/hybrid/claims/", "src/softtact/evaluation/decisions.py")
 NOT_AGAIN = "not judged again"
@@ -195,6 +197,8 @@ def page(made: dict[str, object]) -> str:
     """The page's text, from the tables and pictures in docs/results/."""
     edited = ", with edited files" if made["edited"] else ""
     claims = pd.read_csv(FOLDER / Path(CLAIMS).name, keep_default_na=False)
+    config = yaml.safe_load((FOLDER / "config.yaml").read_text(encoding="utf-8"))
+    meshes = " ".join(mesh_sentences(config))
     parts = ["# Results of the default study\n" if made["study"] == "default" else f"# Results of the study {made['study']}\n",
              "## What was found\n",
              *(f"* {sentence}" for sentence in found(FOLDER, verdicts_today(claims, made), str(made["run"]))),
@@ -210,13 +214,16 @@ def page(made: dict[str, object]) -> str:
     for name, caption in FIGURES.items():
         if (FOLDER / f"{name}.png").is_file():
             parts.append(f"## {caption.partition('.')[0]}\n\n![{caption}](results/{name}.png)\n\n{caption}\n")
-    parts += ["## Claims of the paper\n", claims_in_words(claims, made) + "\n"]
+    parts += ["## Claims of the paper\n", *([meshes + "\n"] if meshes else []), claims_in_words(claims, made) + "\n"]
     for title, (file, columns) in TABLES.items():
         kept = FOLDER / Path(file).name
         if kept.is_file():
             frame = with_chance(pd.read_csv(kept)) if title == "Policies" else pd.read_csv(kept)
-            shown = frame[[name for name in columns if name in frame]] if columns else frame
-            note = f"{NOTES[title]}\n\n" if title in NOTES else ""
+            chosen = frame[[name for name in columns if name in frame]] if columns else frame
+            shown = with_mesh_error(chosen, config)
+            notes = [NOTES[title]] if title in NOTES else []
+            notes += [meshes] if meshes and title in BY_MESH else []
+            note = "".join(f"{sentence}\n\n" for sentence in notes)
             parts.append(f"## {title}\n\n{note}[{kept.name}](results/{kept.name})\n\n{markdown(shown)}\n")
     return "\n".join(parts)
 

@@ -203,6 +203,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
         assert 0 <= page.index(first) < page.index(then), then
     assert "mean training reading at that force" in page and "skill over the best trivial predictor" in page
     assert "mae_counts" not in page
+    assert page.count("mesh of the model and root mean square error") == 2     # of the result and the scores by set
     assert "0.500 to 0.700" in page and "one item: none" in page
     assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
     assert "a &lt; b" in page and "What is synthetic" in page

@@ -32,6 +32,7 @@ HEADERS = {
     "validation_loss": "validation loss there, counts",
     "unseen_loss": "loss on unseen indenters, counts", "late_fall": "fall of the loss in the last quarter",
     "remains": "what remains of the loss", "gain": "counts at dC/C0 = 1",
+    "mesh_error": "mesh of the model and root mean square error of its maps, in their largest value",
     "percentile_counts": "99th percentile of the readings, counts", "peak_counts": "median of the maps' peaks, counts",
     "full_share": "share of taxels at the end of the range", "mean_counts": "mean reading, counts", "material": "material",
     "law": "law",

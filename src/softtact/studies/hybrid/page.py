@@ -15,6 +15,7 @@ from softtact.published.archive import MAPS_OF_SETS
 from softtact.reporting.page import Page, counted
 from softtact.reporting.run_record import run_sentence
 from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words
+from softtact.studies.hybrid.mesh_error import mesh_sentences, with_mesh_error
 
 CAPTIONS = {
     "fig2_section": "Figure 2. Section through the sensor at rest and pressed: how the frusta fold. Curved elements are cut by "
@@ -70,9 +71,6 @@ _RECORDED_READINGS = (
     "Readings are own recordings of a real sensor, not the paper's, so none of its numbers is judged on them. That a "
     "recorded object is that of its mesh, that it lay where the study presses it, and the order of the taxels are taken as stated: "
     "nothing here checks them.")
-# Errors of the maps of the meshes at 50 N: root mean square, and at single points (docs/explanation/discretisation.md).
-MESH_ERRORS = {"draft": "2 to 5 % of its largest value in the root mean square and up to 10 % at single points",
-               "default": "up to 2 % of its largest value in the root mean square and up to 5 % at single points"}
 
 
 def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Path, run: pd.DataFrame) -> str:
@@ -91,7 +89,7 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     for text, anchor in (("Configuration", "config"), ("Code", "code")):
         page.other_page(text, f"{SOURCES_PAGE}#{anchor}")
     _show_figures(page, inputs["figures"], settings["sources"], {"fig5_ftir": ftir["verdict"]})
-    _show_tables(page, inputs)
+    _show_tables(page, inputs, {} if archive else settings["config"])
     page.claims(claims, file=inputs["claims"],
                 links=[_code("softtact/studies/hybrid/claims/table.py")])
     page.section("What was run, on what, how long", anchor="run")
@@ -145,17 +143,19 @@ def _show_figures(page, paths, sources, more):
                     links=[("Data", data), _code(*map(_below_src, source.get("code", ()))), _CONFIGURATION])
 
 
-def _show_tables(page, inputs):
+def _show_tables(page, inputs, config):
     page.section("Result in one table")
     page.text("Grasped objects: at the largest force, the paper's test 2, and over all forces. Skill is (score - best trivial) / "
               "(ceiling - best trivial) of the mean SSIM; below 0, that predictor reads better than the network. The file holds "
               "all sets and forces.")
-    page.table(result_table(read_csv(inputs["scores"], dtype={"force": str})), file=inputs["scores"])
+    result = result_table(read_csv(inputs["scores"], dtype={"force": str}))
+    page.table(with_mesh_error(result, config), file=inputs["scores"])
     page.section("Tables")
     for name, title in TITLES.items():
         if name in inputs:
             code = _code(f"softtact/studies/hybrid/stages/{_MODULE_OF.get(name, 'make_tables')}.py")
-            page.table(_in_words(read_csv(inputs[name])), title, file=inputs[name], links=[code, _CONFIGURATION])
+            table = _in_words(with_mesh_error(read_csv(inputs[name]), config))
+            page.table(table, title, file=inputs[name], links=[code, _CONFIGURATION])
 
 
 _CONFIGURATION = ("", [("Configuration", f"{SOURCES_PAGE}#config")])
@@ -228,8 +228,8 @@ def recorded(settings: dict[str, Any]) -> bool:
 
 def _of_presses(settings):
     return ["No robot and no gripper: a grasp is a rigid object pressed on one sensor along its normal with a stated force.",
-            *([_RECORDED_READINGS] if recorded(settings) else []), _places(settings), _sizes(settings), *_mesh(settings["config"]),
-            _seeds(settings)]
+            *([_RECORDED_READINGS] if recorded(settings) else []), _places(settings), _sizes(settings),
+            *mesh_sentences(settings["config"]), _seeds(settings)]
 
 
 def _beside_archive(settings):
@@ -250,14 +250,6 @@ def _sizes(settings):
             f"{MAPS_OF_SETS[0]:,} maps to train and validate, {maps['unseen']:,} of {MAPS_OF_SETS[1]:,} unseen cases, "
             f"{settings['grasps']} of {PAPERS_OBJECTS} objects with {grasps:,} of {MAPS_OF_SETS[2]:,} grasps (readings "
             f"of {presses['grasps']} presses).")
-
-
-def _mesh(config):
-    """A sentence on the error of the tested hyperelastic model's mesh, if it was measured."""
-    presets = {name: model.get("mesh", {}).get("preset") or "default" for name, model in config.get("models", {}).items()
-               if name in config.get("tested", ()) and model.get("kind", "hyperelastic") == "hyperelastic"}
-    return [f"Mesh: the {preset} one of the {name} model puts its map off by {MESH_ERRORS[preset]}."
-            for name, preset in presets.items() if preset in MESH_ERRORS]
 
 
 def _seeds(settings):
