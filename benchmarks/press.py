@@ -80,4 +80,4 @@ if __name__ == "__main__":
         parser.add_argument("objects", nargs="*", default=OBJECTS, metavar="OBJECT.stl")
         parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
         given = parser.parse_args()
-        main(given.objects, find_device(given.device))
+        main(given.objects, find_device(given.device, library="warp"))

@@ -10,14 +10,14 @@ from softtact.errors import InputError, how_to_install
 
 # For each library: its name in messages, a pattern of the device names that it accepts, and these names for a message.
 _NAMES = {"torch": ("torch", r"cpu|auto|cuda(:\d+)?", "'cpu', 'cuda', 'cuda:1' or 'auto'"),
-          "warp": ("Warp", "cpu|auto|cuda|warp", "'cpu', 'warp', 'cuda' or 'auto'")}
+          "warp": ("Warp", r"cpu|auto|cuda(:\d+)?|warp", "'cpu', 'warp', 'cuda', 'cuda:1' or 'auto'")}
 _DRIVERS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd")     # NVIDIA's, that of Windows' subsystem for Linux, AMD's
 
 
 def find_device(name: str, *, library: str = "torch") -> str:
     """The device for a name: `cpu`, or the library's name of a GPU. `auto` takes a GPU if there is one; `cuda` requires one.
 
-    library: torch, which also accepts `cuda:1`, or warp, which also assembles elements on the processor, under the name `warp`
+    library: torch, or warp, which also sums elements up on the processor, under the name `warp`
     Raises InputError where the name is unknown, or the GPU that was asked for is not there.
     """
     title, pattern, choices = _NAMES[library]

@@ -72,7 +72,8 @@ def add(commands: argparse._SubParsersAction) -> None:
                               "half of the time), fine (1 %%, twice the time) or stable (for frusta pressed deeper than "
                               "half of their height)")
     command.add_argument("--device", default="cpu", metavar="DEVICE",
-                         help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is one)")
+                         help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is "
+                              "one), with the extra device")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
     _add_soft(command)

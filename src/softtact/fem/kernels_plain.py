@@ -67,33 +67,33 @@ class PlainLoops:
         seen = np.einsum("gp,egk->epk", at_rest.basis, change)
         inner = mode_moduli(at_rest, volume)
         out += np.einsum("epk,epq,eql->ekl", seen, inner, seen, optimize=True)
+        if volume.quartic.size:
+            crossed = np.einsum("gp,eg,egk->epk", at_rest.basis, volume.quartic, change)
+            half = np.einsum("epk,epq,eql->ekl", seen, at_rest.gram_inverse[at_rest.shapes], crossed, optimize=True)
+            out -= half + half.transpose(0, 2, 1)
         return out.astype(like.dtype, copy=False)
 
 
 def material_tensor(deformed: Deformation, moduli: np.ndarray, volume: VolumeResponse) -> np.ndarray:
     """dS_ij / dE_kl (e, g, 3, 3, 3, 3) in MPa at the points at constant pressure, from the law's moduli (e*g, 6, 6)."""
-    refuse_quartic(volume)
     J, inverse = deformed.J, _inverses(deformed.C)[:, _VOIGT].reshape(*deformed.J.shape, 3, 3)
     pj, local = volume.pressure * J, 0.5 * volume.unprojected * (J**2 + 1)
+    if volume.quartic.size:
+        local = local + volume.quartic * J**2
     crossed = np.einsum("egik,egjl->egijkl", inverse, inverse) + np.einsum("egil,egjk->egijkl", inverse, inverse)
     D = moduli[:, _VOIGT][:, :, :, _VOIGT].reshape(*J.shape, 3, 3, 3, 3)
     D = D + np.einsum("eg,egij,egkl->egijkl", pj + local, inverse, inverse)
     return D - np.einsum("eg,egijkl->egijkl", pj, crossed)
 
 
-def refuse_quartic(volume: VolumeResponse) -> None:
-    """Refuse the quartic penalty, which these loops do not implement."""
-    if volume.quartic.size:
-        raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
-
-
 def mode_moduli(at_rest: ElementArrays, volume: VolumeResponse) -> np.ndarray:
     """Moduli (e, p, p) in MPa/mm3 of the elements' projected volume change."""
-    gram = at_rest.gram_inverse[at_rest.shapes]
-    if not volume.stiffness.size:
-        return volume.modulus * gram
-    weighted = at_rest.volumes[at_rest.shapes] * volume.stiffness
-    return gram @ np.einsum("eg,gp,gq->epq", weighted, at_rest.basis, at_rest.basis) @ gram
+    gram, basis, w = at_rest.gram_inverse[at_rest.shapes], at_rest.basis, at_rest.volumes[at_rest.shapes]
+    out = np.zeros_like(gram) if volume.stiffness.size else volume.modulus * gram
+    for moduli in (volume.stiffness, volume.quartic):
+        if moduli.size:
+            out = out + gram @ np.einsum("eg,gp,gq->epq", w * moduli, basis, basis) @ gram
+    return out
 
 
 def _inverses(C6: np.ndarray) -> np.ndarray:

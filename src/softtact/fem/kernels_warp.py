@@ -18,6 +18,7 @@ from softtact.fem.kernels import Deformation, ElementArrays, VolumeResponse
 wp.config.log_level = wp.LOG_WARNING     # keeps Warp's notices out of a command's output
 _AT_ONCE = 4096     # elements whose tangents are on the device at once: 1 GB for the largest elements
 _MOST_KEPT = 64     # constant arrays that are kept on the device
+_NONE = np.zeros((0, 0))
 _real = wp.float64
 _R3, _R4 = wp.array3d(dtype=_real), wp.array4d(dtype=_real)
 
@@ -78,14 +79,20 @@ def _force(F: wp.array2d(dtype=wp.mat33d), S: wp.array2d(dtype=wp.mat33d), gradi
 
 @wp.kernel
 def _elasticity(F: wp.array2d(dtype=wp.mat33d), S: wp.array2d(dtype=wp.mat33d), moduli: _R3, pressure: wp.array2d(dtype=_real),
-                unprojected: _real, volumes: wp.array2d(dtype=_real), shapes: wp.array(dtype=wp.int32), A: _R4):
-    """A_(3i+k),(3j+l) = F_ip F_jq D_pkql + delta_ij S_kl at a point, times its volume; D as `kernels_plain.material_tensor`."""
+                quartic: wp.array2d(dtype=_real), unprojected: _real, volumes: wp.array2d(dtype=_real),
+               shapes: wp.array(dtype=wp.int32), A: _R4):
+    """A_(3i+k),(3j+l) = F_ip F_jq D_pkql + delta_ij S_kl at a point, times its volume; D as `kernels_plain.material_tensor`.
+
+    quartic: the penalty's second derivative at the points, or no points
+    """
     e, g, row = wp.tid()
     f = F[e, g]
     J = wp.determinant(f)
     inverse = wp.inverse(wp.transpose(f) * f)
     pj = pressure[e, g] * J
     whole = pj + _real(0.5) * unprojected * (J * J + _real(1.0))
+    if quartic.shape[0] > 0:
+        whole += quartic[e, g] * J * J
     volume = volumes[shapes[e], g]
     n = e * F.shape[1] + g
     i = row / 3
@@ -110,9 +117,9 @@ def _elasticity(F: wp.array2d(dtype=wp.mat33d), S: wp.array2d(dtype=wp.mat33d), 
 
 
 @wp.kernel
-def _changes(F: wp.array2d(dtype=wp.mat33d), volumes: wp.array2d(dtype=_real), gradients: _R4,
+def _changes(F: wp.array2d(dtype=wp.mat33d), weights: wp.array2d(dtype=_real), volumes: wp.array2d(dtype=_real), gradients: _R4,
              shapes: wp.array(dtype=wp.int32), basis: wp.array2d(dtype=_real), seen: _R4):
-    """Derivatives of the projected volume of each mode by the nodal displacements."""
+    """Derivatives of the volume of each mode by the nodal displacements; weights of the points, or no points: all are 1."""
     e, p, a = wp.tid()
     s = shapes[e]
     total = wp.vec3d()
@@ -120,14 +127,21 @@ def _changes(F: wp.array2d(dtype=wp.mat33d), volumes: wp.array2d(dtype=_real), g
         f = F[e, g]
         cofactor = wp.determinant(f) * wp.transpose(wp.inverse(f))
         along = cofactor * wp.vec3d(gradients[s, g, 0, a], gradients[s, g, 1, a], gradients[s, g, 2, a])
-        total += basis[g, p] * volumes[s, g] * along
+        share = basis[g, p] * volumes[s, g]
+        if weights.shape[0] > 0:
+            share *= weights[e, g]
+        total += share * along
     for i in range(3):
         seen[e, p, a, i] = total[i]
 
 
 @wp.kernel
-def _blocks(A: _R4, gradients: _R4, shapes: wp.array(dtype=wp.int32), seen: _R4, inner: _R3, upper: int, K: _R3):
-    """The block of two nodes of an element's tangent; upper: blocks below the diagonal are left out."""
+def _blocks(A: _R4, gradients: _R4, shapes: wp.array(dtype=wp.int32), seen: _R4, inner: _R3, crossed: _R4, gram_inverse: _R3,
+            upper: int, K: _R3):
+    """The block of two nodes of an element's tangent; upper: blocks below the diagonal are left out.
+
+    crossed: the modes' volumes weighted by the quartic penalty, or no elements
+    """
     e, a, b = wp.tid()
     if upper == 1 and b < a:
         return
@@ -148,6 +162,9 @@ def _blocks(A: _R4, gradients: _R4, shapes: wp.array(dtype=wp.int32), seen: _R4,
             for i in range(3):
                 for j in range(3):
                     block[i, j] += seen[e, p, a, i] * inner[e, p, q] * seen[e, q, b, j]
+                    if crossed.shape[0] > 0:
+                        block[i, j] -= gram_inverse[s, p, q] * (seen[e, p, a, i] * crossed[e, q, b, j]
+                                                                + crossed[e, p, a, i] * seen[e, q, b, j])
     for i in range(3):
         for j in range(3):
             K[e, 3 * a + i, 3 * b + j] = block[i, j]
@@ -166,10 +183,10 @@ def _scatter(K: _R3, positions: wp.array2d(dtype=wp.int32), first: int, values: 
 
 
 class WarpKernels:
-    """The loops of `kernels` on a device of Warp: "cpu", or "cuda" where there is one."""
+    """The loops of `kernels` on a device of Warp: "cuda", or the processor under the name "warp"."""
 
-    def __init__(self, device: str = "cpu") -> None:
-        self.device = wp.get_device(device)
+    def __init__(self, device: str) -> None:
+        self.device = wp.get_device("cpu" if device == "warp" else device)
         self._kept: dict[int, tuple[np.ndarray, Any]] = {}
 
     def _array(self, values: np.ndarray, dtype: Any = _real) -> Any:
@@ -237,17 +254,20 @@ class WarpKernels:
 
     def _tangents(self, deformed, at_rest, stress, moduli, volume, *, upper=False):
         """Tangents (e, 3 m, 3 m) on the device."""
-        from softtact.fem.kernels_plain import mode_moduli, refuse_quartic
+        from softtact.fem.kernels_plain import mode_moduli
 
-        refuse_quartic(volume)
         gradients, volumes, shapes = self._rest(at_rest)
-        pressure = self._array(volume.pressure)
+        pressure, quartic = self._array(volume.pressure), self._array(volume.quartic)
         F, S = self._stressed(deformed, at_rest, stress, pressure)
         elements, points, nodes = *deformed.J.shape, at_rest.gradients.shape[3]
         A, whole = self._room((elements, points, 9, 9)), self._array(moduli)
-        self._launch(_elasticity, (elements, points, 9), F, S, whole, pressure, volume.unprojected, volumes, shapes, A)
+        self._launch(_elasticity, (elements, points, 9), F, S, whole, pressure, quartic, volume.unprojected, volumes, shapes, A)
+        rest = volumes, gradients, shapes, self._constant(at_rest.basis)
         seen = self._room((elements, at_rest.basis.shape[1], nodes, 3))
-        self._launch(_changes, seen.shape[:3], F, volumes, gradients, shapes, self._constant(at_rest.basis), seen)
+        self._launch(_changes, seen.shape[:3], F, self._array(_NONE), *rest, seen)
+        crossed = self._room((elements if volume.quartic.size else 0, *seen.shape[1:]))
+        self._launch(_changes, crossed.shape[:3], F, quartic, *rest, crossed)
         K, inner = self._room((elements, 3 * nodes, 3 * nodes)), self._array(mode_moduli(at_rest, volume))
-        self._launch(_blocks, (elements, nodes, nodes), A, gradients, shapes, seen, inner, int(upper), K)
+        self._launch(_blocks, (elements, nodes, nodes), A, gradients, shapes, seen, inner, crossed,
+                     self._constant(at_rest.gram_inverse), int(upper), K)
         return K

@@ -60,7 +60,7 @@ class SolidBlock:
     them, by default a different one for each; basis (g, p): functions on which the volume change is projected (`pressure_modes`);
     unprojected_penalty_ratio: k / mu; quartic_penalty_ratio: q / mu.
     Displacements are given per element (e, m, 3) in mm. at_rest: the arrays as `ElementArrays`. loops: the implementation of the
-    sums over points and nodes, `kernels` or a `DeviceKernels`. history: what the points of an inelastic law remember; without one
+    sums over points and nodes, `kernels` or `WarpKernels`. history: what the points of an inelastic law remember; without one
     the law is that of first loading.
     """
 

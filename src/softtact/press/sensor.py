@@ -85,8 +85,8 @@ class Sensor:
     attributes: dict[str, Any] = field(default_factory=dict)
     """Facts that each of its results holds."""
     device: str = "cpu"
-    """Where the hyperelastic model, and the solid model on a sensor of kind solid, sum up their elements: `cpu`, `cuda`, or `auto`:
-    a GPU where torch finds one; the solid model also takes `warp`."""
+    """Where the hyperelastic model, and the solid model on a sensor of kind solid, sum up their elements: `cpu`, or with
+    the extra `device` `cuda`, `auto` (a GPU where Warp finds one) or `warp` (Warp's kernels on the processor)."""
     elements: SolidMesh | None = None
     """Of a sensor of kind solid: its mesh at rest, in mm."""
 
@@ -172,15 +172,15 @@ class Sensor:
     def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
         """The `LayeredBody` that the hyperelastic model presses on."""
         self.need_elastic("hyperelastic model")
-        build, device = KINDS[self.spec.kind].body, find_device(self.device)
+        build, device = KINDS[self.spec.kind].body, find_device(self.device, library="warp")
         if build is None:
             raise InputError(f"{self.spec.name} has no layers, which the hyperelastic model needs; use the solid model.")
         laws = {f"{layer}_law": self.laws[layer] for layer in self.spec.materials}
         body = build(self.spec, **laws, mesh=self.mesh, scatter=self.scatter, threads=threads, surface=surface)
         if device != "cpu":
-            from softtact.fem.kernels_torch import DeviceKernels  # torch, which takes seconds to import
+            from softtact.fem.kernels_warp import WarpKernels  # Warp, which takes seconds to import
 
-            body.sum_with(DeviceKernels(device))
+            body.sum_with(WarpKernels(device))
         return body
 
     def checked_forces(self, force_n: float | Sequence[float]) -> np.ndarray:

@@ -28,7 +28,7 @@ from softtact.models.newton import line_search_each
 from softtact.progress import Watch
 
 if TYPE_CHECKING:
-    from softtact.fem.kernels_torch import DeviceKernels
+    from softtact.fem.kernels_warp import WarpKernels
 
 _FRUSTUM_STEPS = 6               # Newton steps for a frustum; a remaining imbalance is left to the next global step
 _FRUSTUM_HALVINGS = 5
@@ -164,8 +164,8 @@ class LayeredBody:
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
         self._shift: float | None = None     # the one that made the last tangent positive definite
 
-    def sum_with(self, loops: "ModuleType | DeviceKernels") -> None:
-        """Use `loops` for the sums over elements: `kernels`, the default, or `device_kernels`."""
+    def sum_with(self, loops: "ModuleType | WarpKernels") -> None:
+        """Use `loops` for the sums over elements: `kernels`, the default, or `WarpKernels`."""
         for block in self.slab.blocks + self.support.blocks:
             block.loops = loops
 

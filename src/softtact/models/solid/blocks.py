@@ -111,7 +111,7 @@ def sum_on(blocks: Sequence[tuple[str, np.ndarray, SolidBlock]], device: str) ->
     """Let Warp sum up the spatial elements."""
     from softtact.fem.kernels_warp import WarpKernels
 
-    loops = WarpKernels("cpu" if device == "warp" else device)
+    loops = WarpKernels(device)
     for _, _, block in blocks:
         if not isinstance(block.loops, PlainLoops):
             block.loops = loops  # type: ignore[assignment]
