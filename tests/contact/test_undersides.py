@@ -1,13 +1,15 @@
-"""Undersides of many poses: those of `HeightField`, `Underside` and `Shell`, pose by pose."""
+"""Undersides of objects in many poses and of placed meshes: one way, and its specification in plain NumPy."""
 
+import naive_underside as naive
 import numpy as np
 import pytest
 import trimesh
 
-from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.height_field import HeightField
+from softtact.contact.lower_envelope import NO_CONTACT_MM
+from softtact.contact.narrow_parts import lowest_missed
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
-from softtact.contact.underside import Underside
 from softtact.contact.undersides import ObjectSurface, Target
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
@@ -16,39 +18,72 @@ from softtact.geometry.pose import Pose
 X_MM, Y_MM = np.linspace(-5, 5, 21), np.linspace(-7, 7, 29)
 REACH_MM = 2.0
 SHELL = Shell((10.0, 14.0), 0.8, 2.0)
-MESHES = {"ball": trimesh.creation.icosphere(subdivisions=3, radius=4.0), "plate": trimesh.creation.box((16.0, 9.0, 2.0)),
+MESHES = {"ball": trimesh.creation.icosphere(subdivisions=2, radius=4.0), "plate": trimesh.creation.box((16.0, 9.0, 2.0)),
           "wall": trimesh.creation.box((0.2, 6.0, 3.0)), "pin": trimesh.creation.cylinder(radius=0.1, height=3.0, sections=8),
-          "cylinder": trimesh.creation.cylinder(radius=2.5, height=4.0)}
+          "slivers": trimesh.creation.cylinder(radius=2.5, height=4.0, sections=60),
+          "tube": trimesh.creation.annulus(r_min=1.2, r_max=1.4, height=3.0, sections=16),
+          "wider than the pad": trimesh.creation.box((40.0, 60.0, 5.0))}
+POSES = [None, Pose.from_values((0.25, 0.5, 0, 0, 0, 0)), Pose.from_values((1.3, -2.1, -4.0, 12.0, -17.0, 40.0)),
+         Pose.from_values((-0.4, 0.9, 3.0, 105.0, 30.0, 200.0))]
+
+
+def grid_of(sides):
+    lines = (np.linspace(line[0], line[-1], 2 * len(line) - 1) for line in (X_MM, Y_MM))
+    return NodeGrid(*(line if sides else line[1:-1] for line in lines), sides=sides)
 
 
 def target(grid):
     return Target(grid, X_MM, Y_MM, (10.0, 14.0), SHELL, REACH_MM)
 
 
-def poses():
-    rng = np.random.default_rng(4)
-    places = [Pose.from_values((*rng.uniform(-4, 4, 2), 3.0, *rng.uniform(-20, 20, 2), rng.uniform(0, 360))) for _ in range(5)]
-    return [None, Pose.from_values((0.25, 0.5, 0, 0, 0, 0)), *places]
-
-
 @pytest.mark.parametrize("sides", [True, False])
 @pytest.mark.parametrize("name", MESHES)
-def test_an_underside_is_that_of_the_object_placed_in_its_pose(name, sides):
-    lines = (np.linspace(line[0], line[-1], 2 * len(line) - 1) for line in (X_MM, Y_MM))
-    grid = NodeGrid(*(line if sides else line[1:-1] for line in lines), sides=sides)
-    surface, aim = ObjectSurface(MESHES[name]), target(grid)
-    for pose in poses():
+def test_an_underside_is_that_of_its_specification_in_any_pose(name, sides):
+    grid, surface = grid_of(sides), ObjectSurface(MESHES[name])
+    for pose in POSES:
         placed = place(MESHES[name], pose=pose)
-        field = HeightField(placed)
-        points, touch = Underside(field, grid).nodes(REACH_MM), field.first_touch_mm(X_MM, Y_MM)
-        expected = np.full(grid.count, NO_CONTACT_MM)
-        expected[points.nodes] = points.gap
-        found = surface.over(aim, pose)
-        near = np.minimum(expected, found.height_mm) < touch + REACH_MM - 0.1     # heights end at slightly different reaches
-        np.testing.assert_allclose(found.height_mm[near], expected[near], rtol=0, atol=1e-12)
-        assert found.touch_mm == pytest.approx(touch, abs=1e-12)
-        assert found.stop_mm == pytest.approx(SHELL.stop_mm(field), abs=1e-9)
-        assert found.top_mm == pytest.approx(placed.bounds[1, 2] - touch, abs=1e-12)
+        seen, touch = naive.over(grid.x, grid.y, placed).ravel(), naive.first_touch(X_MM, Y_MM, placed)
+        below = min(seen.min(), touch) + REACH_MM
+        expected = np.minimum(seen, naive.lowest_missed(HeightField(placed), grid, seen, below))
+        expected[expected >= below] = NO_CONTACT_MM
+        found = surface.over(target(grid), pose)
+        sure = np.abs(np.minimum(expected, found.height_mm) - below) > 1e-9      # of which side of `below` they are on
+        np.testing.assert_allclose(found.height_mm[sure], expected[sure], rtol=0, atol=1e-9)
+        assert found.touch_mm == pytest.approx(touch, abs=1e-9)
+        on_shell = min(naive.lowest_in_box(box, placed) for box in SHELL.boxes)
+        assert found.stop_mm == pytest.approx(on_shell + SHELL.below_mm if on_shell < NO_CONTACT_MM else np.inf, abs=1e-9)
+        assert found.top_mm == pytest.approx(placed.bounds[1, 2] - touch, abs=1e-9)
+
+
+def odd(name):
+    """A mesh without its lower side, or with all facets inside out, tilted."""
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=4.0)
+    if name == "open":
+        mesh.update_faces(mesh.triangles_center[:, 2] > -3.0)
+    else:
+        mesh.invert()
+    return mesh
+
+
+@pytest.mark.parametrize("mesh", [odd("open"), odd("inside out"), *(
+    place(MESHES[name], pose=POSES[2]) for name in ("ball", "slivers", "tube", "wider than the pad"))])
+def test_lines_and_single_points_find_the_same_bits_and_normals(mesh):
+    surface = HeightField(mesh)
+    x = np.sort(np.concatenate([X_MM, X_MM[3:5] + 1e-9, [0.123]]))      # uneven, and on edges of the meshes
+    heights, triangles = surface.over_lines(x, Y_MM)
+    expected, normals = surface(*(places.ravel() for places in np.meshgrid(x, Y_MM)))
+    assert np.array_equal(heights.ravel(), expected) and np.array_equal(surface.normals_of(triangles).reshape(-1, 3), normals)
+    assert (heights < NO_CONTACT_MM).any()
+
+
+@pytest.mark.parametrize("name", ["wall", "pin", "tube"])
+def test_thin_parts_between_nodes_are_those_that_no_node_around_them_sees(name):
+    grid = grid_of(True)
+    surface = HeightField(place(MESHES[name], pose=Pose.from_values((0.13, 0.11, 0, 0, 0, 20.0))))
+    seen = surface.over_lines(grid.x, grid.y)[0].ravel()
+    found = lowest_missed(surface, grid, seen, 1.0)
+    np.testing.assert_allclose(found, naive.lowest_missed(surface, grid, seen, 1.0), rtol=0, atol=1e-12)
+    assert (found < NO_CONTACT_MM).any()
 
 
 def test_a_sensor_without_a_shell_stops_no_object():

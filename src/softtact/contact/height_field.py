@@ -1,11 +1,13 @@
 """The lower envelope of a rigid triangle mesh: what a sensor below it can touch, exact to the triangles.
 
-Vertical lines through query points are cut with the triangles found in a grid of bins; no sampling of the surface takes place.
+Over lines of points each triangle lowers the heights of the points above which it lies (`lower_envelope`). Vertical lines through
+other points are cut with the triangles found in a grid of bins. No sampling of the surface takes place.
 """
 
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 from weakref import WeakKeyDictionary
 
@@ -13,27 +15,20 @@ import numpy as np
 import trimesh
 
 from softtact.compiled import compiled
+from softtact.contact.lower_envelope import NO_CONTACT_MM, facing_down, lowest_corner, lowest_in_box, lowest_over_lines
 
 _KEPT: "WeakKeyDictionary[trimesh.Trimesh, HeightField]" = WeakKeyDictionary()     # by their contents' hash
 NEAR_MM = 0.1         # height over the sensing surface, or depth below it, beyond which an object is moved to first touch
-NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 
 
 class HeightField:
     """Height z (mm) and unit normal of the underside of a placed object over points (x, y)."""
 
     def __init__(self, mesh: trimesh.Trimesh, *, bins: int = 128) -> None:
-        triangles = np.ascontiguousarray(mesh.triangles, dtype=float)
-        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        area = np.linalg.norm(cross, axis=1)
-        facing_down = cross[:, 2] < -1e-9 * np.maximum(area, 1e-300)   # walls and upper sides cannot be touched
-        self.triangles, self._corners = triangles[facing_down], np.asarray(mesh.faces)[facing_down]
-        self.normals = cross[facing_down] / area[facing_down, None]
-        self.lowest_mm = float(triangles[..., 2].min())
-        low, high = self._plan_bounds()
-        self._origin, self._size = low, np.maximum((high - low) / bins, 1e-6)
-        self._starts, self._members = _fill_bins(self.triangles, self._origin, self._size, bins)
-        self._bins = bins
+        points, facets = np.array(mesh.vertices, dtype=float), np.ascontiguousarray(mesh.faces, dtype=np.int64)
+        self.triangles, self.normals, kept = facing_down(points, facets)
+        self._corners, self._bins = facets[kept], bins
+        self.lowest_mm = float(points[facets, 2].min())
 
     @classmethod
     def of(cls, mesh: trimesh.Trimesh) -> "HeightField":
@@ -42,6 +37,13 @@ class HeightField:
         if found is None:
             found = _KEPT[mesh] = cls(mesh)
         return found
+
+    @cached_property
+    def _search(self):
+        """Origin (2,) and size (2,) of the bins, and the triangles in each: starts (bins^2 + 1,), members."""
+        low, high = self._plan_bounds()
+        size = np.maximum((high - low) / self._bins, 1e-6)
+        return low, size, *_fill_bins(self.triangles, low, size, self._bins)
 
     def _plan_bounds(self):
         if not len(self.triangles):
@@ -52,34 +54,43 @@ class HeightField:
     def moved(self, offset_mm: np.ndarray) -> Self:
         """The height field after a displacement (3,) of the object; both share the bins in which triangles are searched for."""
         other, way = copy.copy(self), np.asarray(offset_mm, dtype=float)
-        other.triangles, other._origin, other.lowest_mm = self.triangles + way, self._origin + way[:2], self.lowest_mm + way[2]
+        other.triangles, other.lowest_mm = self.triangles + way, self.lowest_mm + way[2]
+        if "_search" in vars(self):
+            origin, *same = self._search
+            other._search = (origin + way[:2], *same)
         return other
 
+    def over_lines(self, x_mm: np.ndarray, y_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights (y, x) over points of rising lines x_mm (x,), y_mm (y,), and the triangles (y, x) there; -1 beside the object."""
+        height, number = lowest_over_lines(self.triangles, np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float))
+        return height.reshape(len(y_mm), len(x_mm)), number.reshape(len(y_mm), len(x_mm))
+
     def on_grid(self, x_mm: np.ndarray, y_mm: np.ndarray) -> np.ndarray:
-        """Heights (y, x) over the grid of points x_mm (x,), y_mm (y,); nan beside the object."""
-        x, y = np.meshgrid(x_mm, y_mm)
-        heights = np.asarray(self(x.ravel(), y.ravel())[0], dtype=float).reshape(x.shape)
+        """Heights (y, x) over the points of rising lines x_mm (x,), y_mm (y,); nan beside the object."""
+        heights, _ = self.over_lines(x_mm, y_mm)
         return np.where(heights < NO_CONTACT_MM, heights, np.nan)
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) pointing out of the object (downwards) for points (n,), (n,)."""
         x, y = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(y, dtype=float)
-        height, index = _lowest_crossing(x, y, self.triangles, self._origin, self._size, self._bins,
-                                         self._starts, self._members)
-        normal = np.tile([0.0, 0.0, -1.0], (len(x), 1))
-        hit = index >= 0
-        normal[hit] = self.normals[index[hit]]
-        return height, normal
+        origin, size, starts, members = self._search
+        height, number = _lowest_crossing(x, y, self.triangles, origin, size, self._bins, starts, members)
+        return height, self.normals_of(number)
+
+    def normals_of(self, triangles: np.ndarray) -> np.ndarray:
+        """Normals (..., 3) of triangles by their numbers (...); straight down for -1."""
+        hit = triangles >= 0
+        normal = np.tile([0.0, 0.0, -1.0], (*triangles.shape, 1))
+        normal[hit] = self.normals[triangles[hit]]
+        return normal
 
     def first_touch_mm(self, x_mm: np.ndarray, y_mm: np.ndarray) -> float:
         """Height (mm) of the underside's lowest point over a sensor whose map has columns x_mm and rows y_mm, edges included.
 
         The lowest of the facets' corners over the sensor and of the heights over the map's points; NO_CONTACT_MM if none.
         """
-        corners = self.triangles.reshape(-1, 3)
-        over = ((corners[:, 0] >= x_mm[0]) & (corners[:, 0] <= x_mm[-1]) & (corners[:, 1] >= y_mm[0]) & (corners[:, 1] <= y_mm[-1]))
-        height, _ = self(*(line.ravel() for line in np.meshgrid(x_mm, y_mm)))
-        return float(min(corners[over, 2].min(initial=NO_CONTACT_MM), height.min()))
+        x, y = np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float)
+        return float(min(lowest_corner(self.triangles, x, y), lowest_over_lines(self.triangles, x, y)[0].min()))
 
     def near_touch(self, x_mm: np.ndarray, y_mm: np.ndarray) -> "HeightField":
         """The underside moved down or up to `first_touch_mm` if it is far away, for models whose first guesses start there."""
@@ -113,15 +124,7 @@ class HeightField:
         """Height (mm) of the underside's lowest point over a rectangle with corners low (2,) and high (2,), exact to the triangles;
         NO_CONTACT_MM where the object is not above the rectangle.
         """
-        xy = self.triangles[..., :2]
-        near = ((xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)).all(axis=1)
-        vertices, faces = self.triangles[near].reshape(-1, 3), np.arange(3 * near.sum()).reshape(-1, 3)
-        for axis, sign, bound in ((0, 1.0, low[0]), (1, 1.0, low[1]), (0, -1.0, high[0]), (1, -1.0, high[1])):
-            if not len(faces):
-                break
-            normal, origin = sign * np.eye(3)[axis], bound * np.eye(3)[axis]
-            vertices, faces, _ = trimesh.intersections.slice_faces_plane(vertices, faces, normal, origin)
-        return float(vertices[faces, 2].min(initial=NO_CONTACT_MM))
+        return float(lowest_in_box(self.triangles, np.array([low[0], high[0], low[1], high[1]], dtype=float)))
 
 
 @dataclass(frozen=True)
@@ -153,21 +156,6 @@ class SweptSurface:
         lowest = np.argmin([height for height, _ in each], axis=0)
         every = np.arange(len(x))
         return np.stack([height for height, _ in each])[lowest, every], np.stack([normal for _, normal in each])[lowest, every]
-
-
-def lowest_crossing_naive(x: np.ndarray, y: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
-    """The heights of a `HeightField` by testing every triangle: the reference implementation for tests."""
-    heights = np.full(len(x), NO_CONTACT_MM)
-    for triangle in mesh.triangles:
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = triangle
-        double_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if abs(double_area) < 1e-14:
-            continue
-        u = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / double_area
-        v = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / double_area
-        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-        heights[inside] = np.minimum(heights[inside], (az + u * (bz - az) + v * (cz - az))[inside])
-    return heights
 
 
 def _fill_bins(triangles, origin, size, bins):

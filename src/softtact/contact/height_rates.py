@@ -23,8 +23,8 @@ def gap_rates(surface: HeightField, grid: NodeGrid, points: ObjectPoints, rates:
     Beside an edge a node has the plane of a facet (`Underside`), which it follows as far as its slope is kept there.
     """
     places = np.column_stack([grid.points[points.nodes], points.gap])
-    over_facet = surface(*places[:, :2].T)[0]
-    narrow = points.gap < over_facet
+    over_facet, _ = surface.over_lines(grid.x, grid.y)
+    narrow = points.gap < over_facet.ravel()[points.nodes]
     narrow[points.edge] = False
     if narrow.any():
         places[narrow] = _lowest_at(surface, grid, points.nodes[narrow], points.gap[narrow])
@@ -33,13 +33,12 @@ def gap_rates(surface: HeightField, grid: NodeGrid, points: ObjectPoints, rates:
 
 def touch_rates(surface: HeightField, x_mm: np.ndarray, y_mm: np.ndarray, rates: Rates) -> np.ndarray:
     """Derivatives (k,) of `HeightField.first_touch_mm` by the k numbers of `rates`; of one of several lowest places."""
-    x, y = (line.ravel() for line in np.meshgrid(x_mm, y_mm))
-    heights, normals = surface(x, y)
+    heights, triangles = surface.over_lines(x_mm, y_mm)
     touch = surface.first_touch_mm(x_mm, y_mm)
     if heights.min() <= touch < NO_CONTACT_MM:
-        place = heights.argmin()
-        slope = -normals[place, :2] / normals[place, 2]
-        return _height_rates(rates(np.array([[x[place], y[place], touch]])), slope[None])[:, 0]
+        j, i = np.unravel_index(heights.argmin(), heights.shape)
+        normal = surface.normals_of(triangles[j, i])
+        return _height_rates(rates(np.array([[x_mm[i], y_mm[j], touch]])), -normal[None, :2] / normal[2])[:, 0]
     corners = surface.triangles.reshape(-1, 3)
     over = (np.abs(corners[:, :2]) <= [x_mm[-1], y_mm[-1]]).all(axis=1) & (corners[:, 2] == touch)
     return rates(corners[over][:1])[:, 0, 2]

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.height_field import HeightField
+from softtact.contact.lower_envelope import SPACING, lowest_between
 
 if TYPE_CHECKING:
     from softtact.contact.node_grid import NodeGrid
-
-SPACING = 0.5     # of a step: distance of points along an edge, so that none of the cells that it crosses is left out
-SEEN = 0.6         # slope between a node and a point up to which both belong to one part; a surface without an edge is less steep
 
 
 def lowest_missed(surface: HeightField, grid: "NodeGrid", gap_mm: np.ndarray, below_mm: float) -> np.ndarray:
@@ -23,12 +21,7 @@ def lowest_missed(surface: HeightField, grid: "NodeGrid", gap_mm: np.ndarray, be
 
     gap_mm (n,): heights that the nodes see, NO_CONTACT_MM for none;  below_mm: height from which on parts cannot touch
     """
-    places, nodes = along_edges_over(surface, grid, below_mm)
-    place, height = (places[:, :2] - grid.points[0]) / grid.step, places[:, 2]
-    missed = ~_seen(gap_mm.reshape(grid.shape), place, height, grid.step)
-    lowest = np.full(grid.count, NO_CONTACT_MM)
-    np.minimum.at(lowest, nodes[missed], height[missed])
-    return lowest
+    return lowest_between(surface.triangles, gap_mm, grid.x, grid.y, margin(grid), below_mm)
 
 
 def margin(grid: "NodeGrid") -> float:
@@ -45,13 +38,3 @@ def along_edges_over(surface: HeightField, grid: "NodeGrid", below_mm: float) ->
     inside = ((place >= -beside) & (place <= last + beside)).all(axis=1)
     i, j = np.rint(place[inside]).astype(int).T
     return points[inside], j * grid.shape[1] + i
-
-
-def _seen(gap, place, height, step):
-    """Whether one of the four nodes around places (k, 2), in steps, sees the object about as low as `height` (k,)."""
-    seen, last = np.zeros(len(place), dtype=bool), np.array(gap.shape[::-1]) - 1
-    for corner in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        node = np.clip(np.floor(place).astype(int) + corner, 0, last)
-        away = np.linalg.norm((node - place) * step, axis=1)
-        seen |= gap[node[:, 1], node[:, 0]] <= height + SEEN * away
-    return seen

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import binary_dilation
 
-from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.height_field import HeightField
+from softtact.contact.lower_envelope import NO_CONTACT_MM, heights_of
 from softtact.contact.narrow_parts import lowest_missed
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, ObjectPoints, hat_shares, window_places
@@ -31,7 +32,8 @@ class Underside:
 
     def __init__(self, surface: HeightField, grid: NodeGrid) -> None:
         self._surface, self._grid = surface, grid
-        self._coarse = _sampled(surface, grid)
+        self._coarse, over_node = _sampled(surface, grid)
+        self._height, self._slope = self._coarse[:, 4], _slopes(surface, over_node)
         self.lowest_mm = min(float(self._coarse.min()), surface.first_touch_mm(grid.x, grid.y))
         if self.lowest_mm >= NO_CONTACT_MM:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
@@ -49,24 +51,24 @@ class Underside:
     def points(self, reach_mm: float) -> ObjectPoints:
         """The `ObjectPoints` where the object is less than `reach_mm` above its lowest point."""
         near = self._near_edges()
-        plain = np.setdiff1d(np.flatnonzero(self._middle < self.lowest_mm + reach_mm), near)
+        plain = np.setdiff1d(np.flatnonzero(self._height < self.lowest_mm + reach_mm), near)
         nodes, gap, slope, window, beneath = self._beside_edges(near, reach_mm)
-        height, slopes = self._facets(self._grid.points[plain])
         order = np.argsort(np.concatenate([plain, nodes]))
         edge = np.argsort(order)[len(plain):]
-        found = ObjectPoints(nodes=np.concatenate([plain, nodes])[order], gap=np.concatenate([height, gap])[order],
-                             slope=np.vstack([slopes, slope])[order], edge=edge, window=window, step=self._grid.step,
+        found = ObjectPoints(nodes=np.concatenate([plain, nodes])[order], gap=np.concatenate([self._height[plain], gap])[order],
+                             slope=np.vstack([self._slope[plain], slope])[order], edge=edge, window=window, step=self._grid.step,
                              beneath=beneath)
-        missed = self._missed(found.nodes, found.gap, reach_mm)
+        seen = np.full(self._grid.count, NO_CONTACT_MM)
+        seen[found.nodes] = found.gap
+        missed = self._missed(seen, reach_mm)
         touched = np.flatnonzero(missed < NO_CONTACT_MM)
         return found.with_nodes(touched, missed[touched]) if len(touched) else found
 
     def nodes(self, reach_mm: float) -> ObjectPoints:
         """`points` without partial contact at edges: edges are less sharp, but no node is below the object."""
-        height, slope = self._facets(self._grid.points)
-        missed = self._missed(np.arange(self._grid.count), height, reach_mm)
-        slope[missed < height] = 0.0
-        height = np.minimum(height, missed)
+        missed = self._missed(self._height, reach_mm)
+        slope = np.where((missed < self._height)[:, None], 0.0, self._slope)
+        height = np.minimum(self._height, missed)
         kept = np.flatnonzero(height < self.lowest_mm + reach_mm)
         side = len(window_places())
         return ObjectPoints(nodes=kept, gap=height[kept], slope=slope[kept], edge=np.zeros(0, dtype=np.int64),
@@ -74,30 +76,18 @@ class Underside:
 
     def narrow_parts(self, reach_mm: float) -> bool:
         """Whether the object has parts within `reach_mm` above its lowest point that no node is under."""
-        height = self._facets(self._grid.points)[0]
-        return bool((self._missed(np.arange(self._grid.count), height, reach_mm) < NO_CONTACT_MM).any())
+        return bool((self._missed(self._height, reach_mm) < NO_CONTACT_MM).any())
 
-    def _missed(self, nodes, gap, reach_mm):
-        """`lowest_missed` (n,) where nodes (c,) see gaps (c,)."""
-        seen = np.full(self._grid.count, NO_CONTACT_MM)
-        seen[nodes] = gap
+    def _missed(self, seen, reach_mm):
+        """`lowest_missed` (n,) where nodes see gaps (n,)."""
         return lowest_missed(self._surface, self._grid, seen, self.lowest_mm + reach_mm)
-
-    @property
-    def _middle(self):
-        return self._coarse[:, self._coarse.shape[1] // 2]
-
-    def _facets(self, places):
-        """Height (p,) of the object over places (p, 2), and slope (p, 2), zero beside the object."""
-        height, normal = self._surface(*places.T)
-        return height, np.where((height < NO_CONTACT_MM)[:, None], -normal[:, :2] / normal[:, 2:], 0.0)
 
     def _near_edges(self):
         """Nodes with an edge within the hat function's support or a displacement of one step beyond it."""
         shape, step = self._grid.shape, self._grid.step.min()
         low, high = (bound.reshape(shape) for bound in (self._coarse.min(axis=1), self._coarse.max(axis=1)))
         edges = (low < NO_CONTACT_MM) & (high - low > _SMOOTH * step)
-        middle = self._middle.reshape(shape)
+        middle = self._height.reshape(shape)
         for axis in (0, 1):
             bend = np.abs(np.diff(middle, n=2, axis=axis)) > _KINK * step
             edges |= np.pad(bend, [(1, 1) if k == axis else (0, 0) for k in (0, 1)])
@@ -108,9 +98,12 @@ class Underside:
 
     def _beside_edges(self, near, reach_mm):
         """Nodes near edges that the object may touch: numbers (e,), gaps, slopes and windows; and their `Beneath`."""
-        heights = self._windows(near)
-        over_node = self._above(near, heights, np.zeros((len(near), 2)))
-        over_lowest = self._above(near, heights, _lowest_places(heights))
+        heights, triangles = self._windows(near)
+        over_node = self._above(heights, np.zeros((len(near), 2)), self._height[near], self._slope[near])
+        places, at = _lowest_samples(heights)
+        number = triangles.reshape(-1, np.prod(triangles.shape[1:]))[np.arange(len(near)), at]
+        height = heights_of(self._surface.triangles, number, *(self._grid.points[near] + places * self._grid.step).T)
+        over_lowest = self._above(heights, places, height, _slopes(self._surface, number))
         still = np.zeros((len(near), 2))
         tolerance = _FLAT * self._grid.step.min()
         above, lowest = (hat_shares(np.abs(found[2]), still, tolerance) for found in (over_node, over_lowest))
@@ -122,14 +115,14 @@ class Underside:
         beneath = Beneath(both, *(values[kept][both] for values in over_lowest)) if len(both) else None
         return near[kept], gap[kept], slope[kept], window[kept], beneath
 
-    def _above(self, nodes, heights, places):
-        """Gaps (e,), slopes (e, 2) and windows of nodes on the planes of the facets over places (e, 2) in steps from them.
+    def _above(self, heights, places, height, slope):
+        """Gaps (e,), slopes (e, 2) and windows of nodes on the planes of facets over places (e, 2) in steps from them.
 
-        Facets too steep to represent a node's surroundings count as horizontal; without a facet the gap is NO_CONTACT_MM.
+        height (e,), slope (e, 2): of the facets there. Those too steep to represent a node's surroundings count as horizontal;
+        without a facet the gap is NO_CONTACT_MM.
         """
         step, samples = self._grid.step, window_places()
-        height, slope = self._facets(self._grid.points[nodes] + places * step)
-        slope[np.linalg.norm(slope, axis=1) > _SMOOTH] = 0.0
+        slope = np.where(np.linalg.norm(slope, axis=1, keepdims=True) > _SMOOTH, 0.0, slope)
         gap = height - (slope * places * step).sum(axis=1)
         x, y = (slope[:, axis, None] * samples * step[axis] for axis in (0, 1))
         window = heights - (gap[:, None, None] + y[:, :, None] + x[:, None, :])
@@ -137,36 +130,41 @@ class Underside:
         return gap, slope, window.astype(np.float32)
 
     def _windows(self, nodes):
-        """Heights (e, s, s) of the object at the samples around nodes."""
-        j, i = np.divmod(nodes, self._grid.shape[1])
-        wanted = np.zeros([count + 2 * REACH for count in self._grid.shape], dtype=bool)
-        wanted[j + REACH, i + REACH] = True
-        rectangles = np.argwhere(binary_dilation(wanted, np.ones((3, 3)), iterations=REACH))
-        side = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
-        away = (rectangles - REACH)[:, None, None, ::-1] + np.stack(np.meshgrid(side, side), axis=-1)
-        where = self._grid.points[0] + away * self._grid.step
-        blocks = np.full((*wanted.shape, SAMPLES, SAMPLES), NO_CONTACT_MM)
-        blocks[tuple(rectangles.T)] = self._surface(*where.reshape(-1, 2).T)[0].reshape(-1, SAMPLES, SAMPLES)
-        raster = blocks.transpose(0, 2, 1, 3).reshape(wanted.shape[0] * SAMPLES, -1)
-        size = len(window_places())
-        return sliding_window_view(raster, (size, size))[SAMPLES * j + SAMPLES // 2, SAMPLES * i + SAMPLES // 2]
+        """Heights (e, s, s) of the object at the samples around nodes, and the triangles (e, s, s) over these."""
+        side, size = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5, len(window_places())
+        lines, first = [], []
+        for line, step, place in zip((self._grid.x, self._grid.y), self._grid.step, np.divmod(nodes, self._grid.shape[1])[::-1],
+                                     strict=True):
+            low, high = (place.min(), place.max()) if len(place) else (0, 0)
+            lines.append(line[0] + (np.arange(low - REACH, high + REACH + 1)[:, None] + side).ravel() * step)
+            first.append(SAMPLES * (place - low) + SAMPLES // 2)
+        return [sliding_window_view(raster, (size, size))[first[1], first[0]] for raster in self._surface.over_lines(*lines)]
 
 
 def _sampled(surface, grid):
-    """Heights (n, 9) at three by three samples of each node's rectangle, cut off at the sensor's sides."""
-    side = np.linspace(-0.5, 0.5, 3)
-    where = grid.points[:, None] + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * grid.step * (1 - 1e-9)
-    if grid.sides:
-        where = np.clip(where, grid.points[0], grid.points[-1])
-    return surface(*where.reshape(-1, 2).T)[0].reshape(grid.count, 9)
+    """Heights (n, 9) at 3 x 3 samples of each node's rectangle, cut off at the sensor's sides, and triangles (n,) over nodes."""
+    lines = []
+    for line, step in zip((grid.x, grid.y), grid.step, strict=True):
+        samples = (line[:, None] + np.linspace(-0.5, 0.5, 3) * step * (1 - 1e-9)).ravel()
+        lines.append(np.clip(samples, line[0], line[-1]) if grid.sides else samples)
+    heights, triangles = (values.reshape(len(grid.y), 3, len(grid.x), 3).swapaxes(1, 2).reshape(grid.count, 9)
+                          for values in surface.over_lines(*lines))
+    return heights, triangles[:, 4]
 
 
-def _lowest_places(heights):
-    """Offsets (e, 2) in steps from the node to the lowest sample within the hat function's support; the nearest of equal ones."""
-    places = window_places()
-    x, y = np.meshgrid(places, places)
-    within = np.maximum(np.abs(x), np.abs(y)) < 1
-    away = np.stack([x[within], y[within]], axis=1)
-    hat = heights[:, within]
-    lowest = hat <= hat.min(axis=1, keepdims=True) + 1e-6
-    return away[np.where(lowest, np.linalg.norm(away, axis=1), np.inf).argmin(axis=1)]
+def _slopes(surface, triangles):
+    """Derivatives (n, 2) by x and y of the heights of triangles (n,), zero for -1."""
+    normals = surface.normals_of(triangles)
+    return -normals[:, :2] / normals[:, 2:]
+
+
+def _lowest_samples(heights):
+    """Offsets (e, 2) in steps from the node to the lowest sample within the hat function's support, the nearest of equal ones; and
+    its index (e,) among all samples.
+    """
+    x, y = (places.ravel() for places in np.meshgrid(window_places(), window_places()))
+    away = np.where(np.maximum(np.abs(x), np.abs(y)) < 1, np.hypot(x, y), np.inf)
+    samples = heights.reshape(-1, len(x))
+    lowest = samples <= samples[:, np.isfinite(away)].min(axis=1, keepdims=True) + 1e-6
+    index = np.where(lowest, away, np.inf).argmin(axis=1)
+    return np.column_stack([x[index], y[index]]), index
