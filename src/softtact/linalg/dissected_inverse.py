@@ -7,12 +7,14 @@ and no solution for each load. Of all matrices only the upper triangle is used, 
 Compared with PARDISO's Schur complement and LAPACK's inverse: docs/notebook/2026-11-27-compliance-of-large-pads.md.
 """
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import blas, lapack
+from numba.extending import get_cython_function_address
 
 from softtact.compiled import compiled
 from softtact.linalg.multifrontal import add_to, runs_of
@@ -44,6 +46,25 @@ def _negate_and_mirror(triangle, out):
             out[i, j] = out[j, i] = -triangle[i, j]
 
 
+def _routine(module: str, name: str, arguments: int) -> Any:
+    """A routine of SciPy's LAPACK or BLAS as a function of so many addresses. Unlike SciPy's own it runs without Python's lock, so
+    several inverses can be computed at once.
+    """
+    return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)(get_cython_function_address(f"scipy.linalg.{module}", name))
+
+
+_POTRF = _routine("cython_lapack", "dpotrf", 5)
+_TRSM, _SYRK = _routine("cython_blas", "dtrsm", 11), _routine("cython_blas", "dsyrk", 10)
+
+
+def _called(routine: Any, *arguments: str | int | float | np.ndarray) -> int:
+    """Call a routine with letters, whole numbers, factors and arrays; return its last whole number, which LAPACK's sets."""
+    memory: list[Any] = [value.ctypes if isinstance(value, np.ndarray) else ctypes.c_char(value.encode()) if isinstance(value, str)
+                         else ctypes.c_int(value) if isinstance(value, int) else ctypes.c_double(value) for value in arguments]
+    routine(*(value.data if hasattr(value, "data") else ctypes.byref(value) for value in memory))
+    return next(value.value for value in reversed(memory) if isinstance(value, ctypes.c_int))
+
+
 def _refuse(fault):
     if fault:
         raise np.linalg.LinAlgError("The stiffness is not positive definite: a part of the body may be held by nothing.")
@@ -69,12 +90,13 @@ class _Front:
         """Eliminate the pivots; return the update matrix."""
         if not self.pivots.size:
             return self.update
-        factor, fault = lapack.dpotrf(self.pivots.T, lower=1, clean=0, overwrite_a=1)     # lower to Fortran
-        _refuse(fault or not np.isfinite(factor[-1, -1]))     # a nan anywhere reaches the last pivot
-        if not self.update.size:
-            return self.update
-        coupling = blas.dtrsm(1.0, factor, self.coupling.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-        return blas.dsyrk(-1.0, coupling, beta=1.0, c=self.update.T, lower=1, overwrite_c=1).T
+        k, b = self.coupling.shape
+        fault = _called(_POTRF, "L", k, self.pivots, k, 0)     # lower to Fortran
+        _refuse(fault or not np.isfinite(self.pivots[-1, -1]))     # a nan anywhere reaches the last pivot
+        if self.update.size:
+            _called(_TRSM, "R", "L", "T", "N", b, k, 1.0, self.pivots, k, self.coupling, b)
+            _called(_SYRK, "L", "N", b, k, -1.0, self.coupling, b, 1.0, self.update, b)
+        return self.update
 
 
 def _schur_complement(upper, functionals, pieces: Sequence[Piece]):

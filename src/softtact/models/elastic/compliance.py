@@ -18,8 +18,7 @@ from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
 from softtact.contact.object_points import ObjectPoints
 from softtact.contact.unilateral import ContactLoadSteps, press_elastic
 from softtact.files import read_arrays
-from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab
-from softtact.progress import progress
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, of_parities
 from softtact.sensors.base import BaseSpec
 from softtact.sensors.fields import ElasticLayer
 from softtact.sensors.frusta import SensorSpec
@@ -150,9 +149,7 @@ def elastic_compliance(spec: BaseSpec, *, threads: int = 1, cells: tuple[int, ..
     slab = elastic_slab(spec, cells=cells)
     planes, count = [slab.top] if spec.base_held else [slab.top, slab.below_top(0)], slab.top.size
     kept = 3 * np.concatenate([plane.ravel() for plane in planes]) + 2
-    both = np.empty((len(PARITIES), len(kept), count), dtype=np.float32)
-    for number, parity in enumerate(progress(PARITIES, label=f"{spec.name}: compliance, a quarter's parities")):
-        both[number] = slab.compliance(slab.stiffness, kept, parity, threads=threads, dtype=np.float32)[:, :count]
+    both = _among(slab, kept, count, threads, f"{spec.name}: compliance, a quarter's parities")
     blocks = both[:, :count]
     return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks),
                       foundation_modulus=confined_modulus(spec.elastic_layer) / spec.thickness_mm,
@@ -169,12 +166,23 @@ def electrode_plane_compliance(spec: SensorSpec, *, threads: int = 1) -> InnerPl
     slab = QuarterSlab(spec.footprint_mm, [below, above], map_cells(spec), base_held=True, held_below_mm=spec.edge.held_below_mm)
     planes, count = [slab.top, slab.below_top(slab.boundary_over(below))], slab.top.size
     kept = 3 * np.concatenate([plane.ravel() for plane in planes]) + 2
-    both = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads, dtype=np.float32)[:, :count]
-                     for parity in progress(PARITIES, label=f"{spec.name}: compliance at the electrodes, a quarter's parities")])
+    both = _among(slab, kept, count, threads, f"{spec.name}: compliance at the electrodes, a quarter's parities")
     blocks = both[:, :count]
     return InnerPlaneCompliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks),
                                 foundation_modulus=confined_modulus(layer) / spec.thickness_mm,
                                 stencil=_stencil(blocks, slab.top.shape), lower=ParityBlocks(both[:, count:]))
+
+
+def _among(slab, kept, loaded, threads, label):
+    """Compliance (4, k, loaded) of each parity among unknowns (k,) under forces on the first of them, in single precision."""
+    stiffness, out = slab.stiffness, np.empty((len(PARITIES), len(kept), loaded), dtype=np.float32)
+
+    def act(parity, threads):
+        return slab.compliance(stiffness, kept, parity, threads=threads, dtype=np.float32)[:, :loaded]
+
+    for number, block in enumerate(of_parities(act, functionals=len(kept), threads=threads, label=label)):
+        out[number] = block
+    return out
 
 
 def confined_modulus(layer: ElasticLayer) -> float:

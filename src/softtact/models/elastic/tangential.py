@@ -18,7 +18,7 @@ from softtact.compiled import compiled
 from softtact.contact.node_grid import NodeGrid
 from softtact.files import read_arrays
 from softtact.models.elastic.compliance import confined_modulus, elastic_slab, surface_grid
-from softtact.models.quarter_symmetry import PARITIES
+from softtact.models.quarter_symmetry import PARITIES, of_parities
 from softtact.sensors.specification import AnySpec
 
 _SIGNS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])                                     # of x and y
@@ -133,8 +133,9 @@ def surface_compliance(spec: AnySpec, *, threads: int = 1, cells: tuple[int, int
     lower = np.tril_indices(len(kept))
     down = np.tile([1.0, 1.0, -1.0], slab.top.size)        # the mesh's z points out of the sensor
     triangles = np.empty((4, len(lower[0])), dtype=np.float32)
-    for number, parity in enumerate(PARITIES):
-        full = slab.compliance(slab.stiffness, kept, parity, threads=threads)
+    stiffness = slab.stiffness
+    for number, full in enumerate(of_parities(lambda parity, threads: slab.compliance(stiffness, kept, parity, threads=threads),
+                                              functionals=len(kept), threads=threads, label="")):
         full *= down[:, None]
         full *= down
         triangles[number] = full[lower]

@@ -17,8 +17,7 @@ from softtact.files import read_arrays
 from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import map_cells, surface_grid
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
-from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, picked
-from softtact.progress import progress
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, of_parities, picked
 from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
@@ -86,8 +85,9 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
     electrodes, top = slab.below_top(slab.boundary_over(slab.layers[0][0])), slab.top
     sideways = np.concatenate([3 * top[::2, ::2].ravel() + axis for axis in (0, 1)])
     rows = 3 * top.ravel() + 2, 3 * electrodes[::2, ::2].ravel() + 2, sideways
-    parts = (_of_parity(slab, stiffness, descents, followed, rows, parity, threads)
-             for parity in progress(PARITIES, label=f"{spec.name}: compliance, a quarter's parities"))
+    parts = of_parities(lambda parity, threads: _of_parity(slab, stiffness, descents, followed, rows, parity, threads),
+                        functionals=sum(map(len, rows)) + descents.shape[0] + followed.shape[0], threads=threads,
+                        label=f"{spec.name}: compliance, a quarter's parities")
     surface, aside, both, own = _stacked(parts, len(PARITIES))
     membrane, lateral = both[:, :3 * len(centres), :surface.shape[2]], both[:, 3 * len(centres):]
     own = own[:, 3 * len(centres):, 3 * len(centres):]
