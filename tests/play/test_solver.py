@@ -66,7 +66,7 @@ def test_the_coarse_map_is_near_the_whole_one(state, solver):
 
 
 def test_a_coarse_field_has_the_values_of_its_own_grid_at_the_maps_points(solver, state):
-    spec = solver.sensor(state.sensor).spec
+    spec = solver.bench(state.sensor).sensor.spec
     plain = elastic_compliance(spec, cells=draft_cells(spec))
     draft, force = draft_of(spec, plain), np.zeros((3, 1))
     force[1] = 2.0
@@ -93,9 +93,9 @@ def test_a_depth_beyond_the_largest_force_ends_at_that_force(state, solver):
 def test_an_object_that_only_moved_keeps_its_underside_and_has_the_map_of_a_new_one(state):
     solver, there = Solver(), replace(state, x_mm=1.7, y_mm=2.2)
     solver.solve(state, draft=True)
-    kept = solver._underside[1]
+    kept = solver.bench(state.sensor)._underside[1]
     moved = solver.solve(there, draft=True)
-    assert solver._underside[1] is kept
+    assert solver.bench(state.sensor)._underside[1] is kept
     np.testing.assert_allclose(moved.result.deformation_map_mm, Solver().solve(there, draft=True).result.deformation_map_mm,
                                atol=1e-9)
 

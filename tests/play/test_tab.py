@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softtact.play import tab as tab_module
 from softtact.play.files import Folder
 from softtact.play.long_press import LongPress
 from softtact.play.recorded import Recorded
@@ -152,7 +151,7 @@ def test_saved_files_hold_the_press_that_is_shown(tab, seen, tmp_path):
 
 def test_a_long_press_is_started_compared_and_leaves_no_files(tab, seen, tmp_path, monkeypatch):
     """The elastic model stands for a long one: the difference to itself is nothing."""
-    monkeypatch.setattr(tab_module, "LONG_MODELS", ("elastic",))
+    monkeypatch.setattr(tab.solver.bench(tab.state.sensor), "models", ("elastic",))
     tab.run_long("elastic")
     wait_for(lambda: any(result is not None for _, result, _ in seen.long))
     words, result, elastic = next(one for one in seen.long if one[1] is not None)
@@ -162,7 +161,7 @@ def test_a_long_press_is_started_compared_and_leaves_no_files(tab, seen, tmp_pat
 
 
 def test_a_closed_tab_ends_its_long_press(tab, seen, tmp_path, monkeypatch):
-    monkeypatch.setattr(tab_module, "LONG_MODELS", ("elastic",))
+    monkeypatch.setattr(tab.solver.bench(tab.state.sensor), "models", ("elastic",))
     tab.run_long("elastic")
     wait_for(lambda: tab._long is not None)
     process = tab._long._process

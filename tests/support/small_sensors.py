@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from softtact.fem.files.solids import write_mesh
+from softtact.fem.structured_meshes import box
 from softtact.sensors.library import sensor_file
 
 GEL = """
@@ -16,6 +18,26 @@ elastic_layer: {young_mpa: 0.435, poisson: 0.49}
 edge: {held: far}
 friction: {object: 0.5}
 """
+
+
+BLOCK = """
+kind: solid
+name: block
+mesh: {file: block.vtu}
+regions: {rubber: {law: neo_hooke, parameters: {c10: 0.1}, bulk_over_shear: 20}}
+held: {z0: xyz}
+contact: {face: z1, friction: 0.3}
+readouts: {tips: {kind: points, points_mm: [[26, 28, 6], [30, 28, 6]], radius_mm: 2.5}}
+force_range_n: [0, 20]
+"""
+
+
+def small_block(folder: Path) -> Path:
+    """The file of a solid of few elements, 12 x 16 x 6 mm with its middle at (26, 28) mm."""
+    write_mesh(box((20, 20, 0), (32, 36, 6), (3, 4, 2), region="rubber"), folder / "block.vtu")
+    path = folder / "block.yaml"
+    path.write_text(BLOCK)
+    return path
 
 
 def small_coro(folder: Path) -> Path:

@@ -27,7 +27,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                           "once.", EXAMPLES, json=False)
     command.add_argument("mesh", metavar="MESH", type=Path, nargs="*", help=f"{MESH_FILE}; more can be given in the page")
     add_unit(command)
-    command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor of layers (default: coro)")
+    command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor, of any kind (default: coro)")
     command.add_argument("--recording", type=Path, metavar="FILE", help="recording of a real sensor, which plays beside the press")
     command.add_argument("--force-log", type=Path, metavar="FILE", help="log of its forces, with which the object is pressed then")
     command.add_argument("--finger", type=int, default=0, help="of the recording (default: 0)")
@@ -46,8 +46,7 @@ def _play(options):
 
     if not 0 <= options.port < 65536:
         raise InputError(f"--port {options.port}: give a number from 0 to 65535.")
-    if not any_sensor_spec(options.sensor).has_layers:
-        raise InputError(f"--sensor {options.sensor}: the page shows sensors of layers; press on this one with softtact press.")
+    any_sensor_spec(options.sensor)
     check_output_folder(options.out)
     given = {path.name: Object(path, options.unit) for path in options.mesh}
     if len(given) < len(options.mesh):
@@ -95,12 +94,12 @@ def _shipped():
 
 
 def _sensors(given):
-    """Names of the sensors of layers that are known, the given one first."""
+    """Names of the sensors that are known, the given one first."""
     from softtact.sensors.library import ALIASES, known_names
 
     names = [given]
     for name in known_names("sensors"):
         with contextlib.suppress(InputError):     # a file in config/sensors/ that is not whole
-            if name not in (given, *ALIASES["sensors"]) and any_sensor_spec(name).has_layers:
+            if name not in (given, *ALIASES["sensors"]) and any_sensor_spec(name):
                 names.append(name)
     return names

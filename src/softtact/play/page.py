@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from softtact.errors import SofttactError
 from softtact.play import pictures
+from softtact.play.bench import Bench
 from softtact.play.files import Folder
 from softtact.play.recorded import Recorded
 from softtact.play.solver import Shown
 from softtact.play.state import Object, State
-from softtact.play.tab import LEAST_FORCE_N, LONG_MODELS, Tab
+from softtact.play.tab import LEAST_FORCE_N, Tab
 from softtact.press.result import PressResult
-from softtact.press.sensor import Sensor
 
 UNITS = ("mm", "cm", "m", "inch")
 _OBJECT, _BOARD = (228, 140, 60), (46, 60, 72)
@@ -42,7 +42,7 @@ class Page:
         self._gizmo_from = np.zeros(3)
         self._depth_from = 0.0
         self.tab = Tab(state, self, folder)
-        self.tab.long_on_release = _has_frusta(self.tab.solver.sensor(state.sensor))
+        self.tab.long_on_release = self.tab.solver.bench(state.sensor).long_on_release
         self._build_panel(state, sensors)
         self._build_scene()
         self._add_keys()
@@ -69,23 +69,17 @@ class Page:
         """Show what a button did."""
         self._told.content = _plain(sentence)
 
-    def show_long(self, words: str, result: PressResult | None, elastic: Shown | None) -> None:
-        """Show a long press: its progress, or its end with the difference to the elastic map of the same press."""
-        if result is None or elastic is None:
+    def show_long(self, words: str, result: PressResult | None, fast: Shown | None) -> None:
+        """Show a long press: its progress, or its end with the difference to the fast model's of the same press."""
+        if result is None or fast is None:
             self._long_words.content = _plain(words)
             return
-        if result.deformation_map_mm is None:
-            self._long_words.content = f"{words}: it gives no map."
-            return
-        maps = result.deformation_map_mm[-1], elastic.result.deformation_map_mm[-1]
-        rms = float(np.sqrt(((maps[0] - maps[1]) ** 2).mean()))
-        depth = result.indentation_mm[-1]
-        lines = [f"**{words}**: {depth:.3f} mm deep; the elastic map differs by {rms:.4f} mm (root mean square)."]
+        lines = [f"**{words}**: {result.indentation_mm[-1]:.3f} mm deep{_apart(result, fast.result)}."]
         if result.selection_reason:
             lines.append(f"Why this model: {_plain(result.selection_reason)}.")
         lines += [f"Not within validity: {why}." for why in result.validity_reason[-1:] if why]
         self._long_words.content = "\n\n".join(lines)
-        self._difference.image = pictures.comparison(result, elastic.result)
+        self._difference.image = pictures.comparison(result, fast.result)
         self._difference.visible = True
 
     def show_recorded(self) -> None:
@@ -131,7 +125,7 @@ class Page:
             self._turn = gui.add_vector3("turn, deg", (0.0, 0.0, 0.0), step=1.0)
             centre = gui.add_button("Centre", icon=viser.Icon.FOCUS_CENTERED)
         with gui.add_folder("Long model"):
-            self._long = gui.add_dropdown("model", LONG_MODELS, initial_value="foundation")
+            self._long = gui.add_dropdown("model", self.tab.solver.bench(state.sensor).models)
             self._on_release = gui.add_checkbox("after each release", self.tab.long_on_release)
             run = gui.add_button_group("press again", ("Run", "Abandon"))
             self._long_words = gui.add_markdown("Not run.")
@@ -179,7 +173,7 @@ class Page:
             on(slide, lambda: self.tab.change(slide_mm=(float(self._slide_x.value), float(self._slide_y.value))))
         on(self._twist, lambda: self.tab.change(twist_deg=float(self._twist.value)))
         on(self._object, lambda: self.tab.change(object=self._objects[self._object.value]))
-        on(self._sensor, lambda: self.tab.change(sensor=self._sensor.value))
+        on(self._sensor, self._choose_sensor)
         on(self._place, lambda: self.tab.change(x_mm=float(self._place.value[0]), y_mm=float(self._place.value[1])))
         on(self._turn, lambda: self.tab.change(rotation_deg=tuple(map(float, self._turn.value))))
         on(self._on_release, lambda: setattr(self.tab, "long_on_release", self._on_release.value))
@@ -196,6 +190,17 @@ class Page:
     def _choose_load(self):
         self._force.visible, self._depth.visible = self._load_by.value == "force", self._load_by.value == "depth"
         self.tab.change(load_by=self._load_by.value)
+
+    def _choose_sensor(self):
+        """Press on another sensor, with a load that it bears."""
+        name, state = self._sensor.value, self.tab.state
+        try:
+            bench = self.tab.solver.bench(name)
+        except SofttactError as error:
+            self.refuse(str(error))
+            return
+        self.tab.change(sensor=name, force_n=min(state.force_n, bench.force_range_n[1]),
+                        depth_mm=min(state.depth_mm, _deepest_mm(bench)))
 
     def _toggle_record(self):
         records = self.tab.record()
@@ -242,21 +247,16 @@ class Page:
     def _table(self, shown):
         """The numbers of a press as Markdown."""
         result, state = shown.result, shown.state
-        error = float(result.expected_error_mm[-1])
-        rows = [("force", f"{result.normal_force_n[-1]:.4g} N"), ("depth", f"{result.indentation_mm[-1]:.3f} mm"),
-                ("contact", f"{result.contact_area_mm2[-1]:.4g} mm²"),
-                ("deformation, most", f"{result.deformation_map_mm[-1].max():.3f} mm")]
-        if (taxels := pictures.taxels_of(result)) is not None:
-            rows.append(("taxels, sum", f"{np.nansum(taxels):.0f} counts"))
-        if np.isfinite(result.slipping_share[-1]):
-            rows.append(("slipping", f"{result.slipping_share[-1]:.0%}"))
-        if np.isfinite(error):
-            rows.append(("expected error", f"{error:.3f} mm"))
-        rows.append(("map", f"{'coarse, while it moves' if shown.draft else 'whole'}, {1e3 * shown.seconds:.0f} ms"))
+        what = "coarse, while it moves" if shown.draft else "whole" if shown.done else "at first touch"
+        rows = [*(_rows_of(result) if shown.done else []), ("press", f"{what}, {_time(shown.seconds)}")]
         notes = [*shown.remarks, *(f"Not within validity: {why}." for why in result.validity_reason[-1:] if why)]
-        if state.moves and not result.attributes["edge"].startswith("far") and np.isnan(result.slip).all():
-            notes.append("The elastic model has no friction here: slide and twist only change the place.")
-        head = "| elastic model | |\n|---|---|\n"
+        bench = self.tab.solver.bench(state.sensor)
+        if not shown.done:
+            notes.insert(0, f"This sensor has the {bench.models[0]} model alone, which takes seconds to minutes. It runs where the "
+                            "object rests, or with Run below; the page goes on meanwhile.")
+        elif state.moves and isinstance(shown.press.load, float):
+            notes.append(f"The {result.model} model has no friction here: slide and twist only change the place.")
+        head = f"| {result.model} model{'' if shown.done else ': not pressed yet'} | |\n|---|---|\n"
         return head + "\n".join(f"| {name} | {value} |" for name, value in rows) + "".join(f"\n\n{_plain(note)}" for note in notes)
 
     # --- scene ---
@@ -274,7 +274,7 @@ class Page:
         if phase == "start":
             self._gizmo_from = np.array(self._gizmo.position)
             self._depth_from = self._depth_shown()
-        x, y, z = self._gizmo.position
+        x, y, z = np.array(self._gizmo.position) - self.tab.solver.bench(self.tab.state.sensor).middle_mm * [1, 1, 0]
         turn = Rotation.from_quat(self._gizmo.wxyz, scalar_first=True).as_euler("xyz", degrees=True)
         fields: dict[str, Any] = {"x_mm": round(float(x), 3), "y_mm": round(float(y), 3),
                                   "rotation_deg": tuple(np.round(turn, 2).tolist())}
@@ -301,22 +301,23 @@ class Page:
             self._tiles.visible = tiles is not None
 
     def _new_sensor(self, shown):
-        spec = self.tab.solver.sensor(shown.state.sensor).spec
-        (width, length), thickness = spec.footprint_mm, spec.thickness_mm
+        bench = self.tab.solver.bench(shown.state.sensor)
+        (width, length, height), middle = bench.size_mm, bench.middle_mm
         self._scene.add_box("/board", dimensions=(1.04 * width, 1.04 * length, _BOARD_MM), color=_BOARD,
-                            position=(0.0, 0.0, -thickness - _BOARD_MM / 2), cast_shadow=False)
-        self._force.max, self._depth.max = float(spec.force_range_n[1]), round(_DEEPEST * thickness, 2)
-        self._on_release.value = self.tab.long_on_release = _has_frusta(self.tab.solver.sensor(shown.state.sensor))
-        if not self._sensor_shown:
-            self._look(width, length)
+                            position=tuple(middle - [0.0, 0.0, height + _BOARD_MM / 2]), cast_shadow=False)
+        self._force.max, self._depth.max = float(bench.force_range_n[1]), _deepest_mm(bench)
+        self._on_release.value = self.tab.long_on_release = bench.long_on_release
+        self._long.options = bench.models
+        self._long.value = self.tab.long_model = bench.models[0]
+        self._look(middle, max(width, length))
         self._sensor_shown = shown.state.sensor
 
-    def _look(self, width, length):
+    def _look(self, middle, size):
         """Show sensor and taxels beside the panel; above it on a narrow screen, where the panel is below."""
         narrow = self._client.camera.aspect < 1
-        middle = np.array([0.5 * width, -1.5 * length, 0.0] if narrow else [1.1 * width, 0.0, 0.0])
-        self._client.camera.position = middle + _PERSPECTIVE * max(width, length) * (_FARTHER if narrow else 1.0)
-        self._client.camera.look_at = middle
+        at = middle + size * (np.array([0.5, -1.5, 0.0]) if narrow else np.array([0.6, 0.0, 0.0]))
+        self._client.camera.position = at + _PERSPECTIVE * size * (_FARTHER if narrow else 1.0)
+        self._client.camera.look_at = at
 
     def _show_object(self, shown):
         state, mesh = shown.state, self.tab.solver.mesh(shown.state.object)
@@ -329,7 +330,8 @@ class Page:
         if not self.tab.held:
             turn = Rotation.from_euler("xyz", state.rotation_deg, degrees=True)
             height = (Rotation.from_quat(shown.end[1], scalar_first=True).apply(mesh.bounds.mean(axis=0)) + shown.end[0])[2]
-            self._gizmo.position, self._gizmo.wxyz = (state.x_mm, state.y_mm, height), turn.as_quat(scalar_first=True)
+            x, y, _ = self.tab.solver.bench(state.sensor).middle_mm
+            self._gizmo.position, self._gizmo.wxyz = (state.x_mm + x, state.y_mm + y, height), turn.as_quat(scalar_first=True)
         self._show_state(state)
 
     def _show_state(self, state):
@@ -352,9 +354,39 @@ def _plain(sentence: str) -> str:
     return re.sub(r"([\\`*_<>\[\]{}|#$])", r"\\\1", sentence)
 
 
-def _has_frusta(sensor: Sensor) -> bool:
-    """Whether a sensor has frusta, which the foundation model presses in seconds."""
-    return bool(np.isfinite(sensor.spec.frustum_height_mm))
+def _deepest_mm(bench: Bench) -> float:
+    """Largest depth of a press by depth."""
+    return round(_DEEPEST * float(bench.size_mm[2]), 2)
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"
+
+
+def _rows_of(result: PressResult) -> list[tuple[str, str]]:
+    """Names and values of a result's numbers."""
+    rows = [("force", f"{result.normal_force_n[-1]:.4g} N"), ("depth", f"{result.indentation_mm[-1]:.3f} mm"),
+            ("contact", f"{result.contact_area_mm2[-1]:.4g} mm²")]
+    if result.deformation_map_mm is not None:
+        rows.append(("deformation, most", f"{result.deformation_map_mm[-1].max():.3f} mm"))
+    else:
+        rows.append(("displacement, most", f"{pictures.moved_mm(result).max():.3f} mm"))
+    if (taxels := pictures.taxels_of(result)) is not None:
+        rows.append(("taxels, sum", f"{np.nansum(taxels):.0f} counts"))
+    rows += [(f"{places.name}, most", f"{places.values.max():.4g} {places.units}") for places in pictures.places_of(result)]
+    if np.isfinite(result.slipping_share[-1]):
+        rows.append(("slipping", f"{result.slipping_share[-1]:.0%}"))
+    if np.isfinite(error := float(result.expected_error_mm[-1])):
+        rows.append(("expected error", f"{error:.3f} mm"))
+    return rows
+
+
+def _apart(result: PressResult, fast: PressResult) -> str:
+    """How far a fast model's map is from a long model's, in words; empty without two maps."""
+    if result.deformation_map_mm is None or fast.deformation_map_mm is None:
+        return ""
+    rms = float(np.sqrt(((result.deformation_map_mm[-1] - fast.deformation_map_mm[-1]) ** 2).mean()))
+    return f"; the {fast.model} map differs by {rms:.4f} mm (root mean square)"
 
 
 def _glb(mesh: trimesh.Trimesh) -> bytes:

@@ -2,6 +2,7 @@
 
 import shlex
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -51,22 +52,31 @@ class State:
         """Whether the object moves aside or turns after the press down."""
         return any(self.slide_mm) or bool(self.twist_deg)
 
-    def pose(self, mesh: trimesh.Trimesh, *, moved: bool) -> tuple[float, ...]:
-        """The pose of a mesh (mm), its lowest point at z = 0, as six numbers of `Pose.from_values`.
+    def pose(self, mesh: trimesh.Trimesh, *, moved: bool,
+             middle_mm: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)) -> tuple[float, ...]:
+        """The pose of a mesh (mm), its lowest point at the middle's height, as six numbers of `Pose.from_values`.
 
         moved: after slide and twist, where nothing but the last place counts; else before
+        middle_mm: of the sensing surface in the sensor's frame
         """
         turn = Rotation.from_euler("xyz", self.rotation_deg, degrees=True)
         place = np.array([self.x_mm, self.y_mm])
         if moved:
             turn, place = Rotation.from_euler("z", self.twist_deg, degrees=True) * turn, place + self.slide_mm
-        middle = mesh.bounds.mean(axis=0)
-        lowest = turn.apply(mesh.vertices - middle)[:, 2].min()
-        shift = np.append(place, -lowest) - turn.apply(middle)
+        centre = mesh.bounds.mean(axis=0)
+        lowest = turn.apply(mesh.vertices - centre)[:, 2].min()
+        shift = np.append(place, -lowest) - turn.apply(centre) + middle_mm
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Gimbal lock")     # at 90 degrees about y one of the other angles is free
             angles = turn.as_euler("xyz", degrees=True)
         return tuple((np.round([*shift, *angles], _DECIMALS) + 0.0).tolist())     # no -0
+
+    @property
+    def load(self) -> float | str:
+        """The force in N where it is all, else press, slide and twist as the text of a `Motion`."""
+        if self.load_by == "force":
+            return self.motion(self.force_n) if self.moves else float(f"{self.force_n:g}")
+        return f"z -{self.depth_mm:g}" + self.motion(self.force_n).removeprefix(f"fz -{self.force_n:g}")
 
     def motion(self, force_n: float) -> str:
         """The press, the slide and the twist as the text of a `Motion`."""

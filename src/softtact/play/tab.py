@@ -1,4 +1,4 @@
-"""One tab's session: the newest state is pressed, a coarse map while it changes, the whole map and a long model where it rests.
+"""One tab's session: the newest state is pressed, coarse while it changes, whole and by a long model where it rests.
 
 States that came in during a press are passed over, all but the newest. A `View` shows what is found; this module knows no page.
 """
@@ -26,7 +26,6 @@ _RESTS_S = 0.35         # without a change, after which the whole map follows
 _LOOK_S = 0.1           # between two looks at a long press
 _LONGEST_S = 300.0      # of a recording
 LEAST_FORCE_N = 0.1     # of the page
-LONG_MODELS = ("foundation", "hyperelastic", "auto", "solid")
 
 
 class View(Protocol):
@@ -41,8 +40,8 @@ class View(Protocol):
     def tell(self, sentence: str) -> None:
         """Show what a button did, or why it did not."""
 
-    def show_long(self, words: str, result: PressResult | None, elastic: Shown | None) -> None:
-        """Show the progress or the end of a long press; elastic: the elastic map of the same press."""
+    def show_long(self, words: str, result: PressResult | None, fast: Shown | None) -> None:
+        """Show the progress or the end of a long press; fast: the same press as it is shown in the scene."""
 
     def show_recorded(self) -> None:
         """Show the reading of a real sensor's recording at the present time."""
@@ -54,13 +53,15 @@ class Tab:
     def __init__(self, state: State, view: View, folder: Folder, *, solver: Solver | None = None) -> None:
         self.solver, self._view, self._folder = solver or Solver(), view, folder
         self.state, self._changed = state, time.monotonic()
-        self.long_model = "foundation"
+        self.long_model = ""
+        """That of choice where the sensor has none of this name."""
         self.long_on_release = False
         self.shown: Shown | None = None
         self._long: LongPress | None = None
         self._long_state = state
         self._long_of: tuple[State, PressResult] | None = None
         self._wanted: State | None = None           # for a long press
+        self._released: State | None = None         # for which one was started
         self._stop_long = False
         self.held = False
         """Whether the mouse holds the object."""
@@ -98,10 +99,11 @@ class Tab:
 
     def run_long(self, model: str) -> None:
         """Press the present state with a long model."""
-        if model not in LONG_MODELS:
-            raise InputError(f"The model {model!r} is unknown; use one of {', '.join(LONG_MODELS)}.")
+        models = self.solver.bench(self.state.sensor).models
+        if model not in models:
+            raise InputError(f"The model {model!r} is unknown; use one of {', '.join(models)}.")
         with self._lock:
-            self.long_model, self._wanted = model, self.state
+            self.long_model, self._wanted, self._released = model, self.state, self.state
         self._wake.set()
 
     def abandon_long(self) -> None:
@@ -154,7 +156,7 @@ class Tab:
 
     def _frames(self, recorded: list[tuple[float, State]]) -> Iterator[np.ndarray]:
         """Pictures of a recording at `FPS`, all as large as the first."""
-        solver, times = Solver(), np.array([moment for moment, _ in recorded])
+        times = np.array([moment for moment, _ in recorded])
         moments = np.arange(times[0], times[-1] + 1 / FPS, 1 / FPS)
         shape, last, frame = None, None, None
         for number, moment in enumerate(moments):
@@ -162,7 +164,7 @@ class Tab:
                 raise InputError("The tab was closed while its movie was written; record again.")
             state = recorded[int(np.searchsorted(times, moment, side="right")) - 1][1]
             if frame is None or state != last:
-                shown = solver.solve(state, draft=True)
+                shown = self.solver.solve(state, draft=True)
                 frame, last = board(shown.result, shown.clearance_mm), state
                 shape = shape or frame.shape
                 frame = _fitted(frame, shape)
@@ -219,9 +221,12 @@ class Tab:
 
     def _save(self):
         state = self.state
-        shown = self.shown if self.shown and self.shown.state == state and not self.shown.draft else Solver().solve(state)
+        shown = self.shown if self.shown and self.shown.state == state and not self.shown.draft else self.solver.solve(state)
+        if not shown.done:
+            raise InputError(f"The object only touches: the {shown.press.model} model has not run for this press; press Run, and "
+                             "save when it has ended.")
         also = self._long_of[1] if self._long_of and self._long_of[0] == state else None
-        files = self._folder.save_press(shown.press, shown.result, also)
+        files = self._folder.save_press(shown.press, shown.result, None if also is shown.result else also)
         self._view.tell("Saved " + ", ".join(map(str, files)) + ".")
 
     def _aside(self, work: Callable[[], None]) -> None:
@@ -255,37 +260,35 @@ class Tab:
         return self.state in (self._refused, self.shown.state if self.shown else None)
 
     def _next_press(self):
-        """Press the newest state, coarse if it just changed; or the whole map of one that rests."""
+        """Press the newest state, coarse if it just changed; or one that rests whole, and then by a long model."""
         with self._lock:
             state, rests = self.state, not self.held and time.monotonic() - self._changed > _RESTS_S
         if state == self._refused:
             return
         try:
-            new = self.shown is None or self.shown.state != state
-            if not new and not (rests and self.shown.draft and self._is_prepared(state.sensor)):
+            if (new := self.shown is None or self.shown.state != state) or rests and self.shown.draft:
+                if new or self._is_ready(state.sensor):
+                    self._publish(self.solver.solve(state, draft=new))
                 return
-            self._publish(self.solver.solve(state, draft=new))
         except BaseException:
             self._refused = state
             raise
-        if not self.shown.draft and self.long_on_release and self._long is None:
+        if rests and self.long_on_release and self._long is None and state != self._released:
             with self._lock:
-                self._wanted = state
+                self._wanted = self._released = state
 
     def _publish(self, shown):
         self.shown, self._refused = shown, None
         if not self._closed.is_set():
             self._view.show(shown)
 
-    def _is_prepared(self, name):
-        """Whether the whole map's compliance is there; else it is prepared in a thread, once."""
-        sensor = self.solver.sensor(name)
-        if "elastic" in sensor.prepared_models:
-            return True
-        if name not in self._preparing:
+    def _is_ready(self, name):
+        """Whether a whole press needs no preparation; else it is prepared in a thread, once."""
+        bench = self.solver.bench(name)
+        if not bench.is_ready and name not in self._preparing:
             self._preparing.add(name)
-            self._aside(lambda: sensor.prepared("elastic"))
-        return False
+            self._aside(bench.prepare)
+        return bench.is_ready
 
     def _next_look(self):
         """Start, end or look at the long press."""
@@ -307,7 +310,11 @@ class Tab:
         try:
             result = long.result()
             self._long_of = state, result
-            self._view.show_long(f"{result.model}, {long.seconds:.0f} s", result, self.solver.solve(state))
+            self.solver.bench(state.sensor).take(long.press, result)
+            shown = self.solver.solve(state)
+            if shown.result is result and state == self.state:
+                self._publish(shown)
+            self._view.show_long(f"{result.model}, {long.seconds:.0f} s", result, shown)
         finally:
             self._end_long()
 
@@ -319,10 +326,12 @@ class Tab:
     def long_press(self, state: State) -> Press:
         """The press of a state by the long model that is chosen: with slide and twist as a motion where that model follows it."""
         shown = self.shown if self.shown and self.shown.state == state else self.solver.solve(state, draft=True)
-        if not state.moves or self.long_model == "foundation" or isinstance(shown.press.load, str):
-            return replace(shown.press, model=self.long_model)
-        pose = state.pose(self.solver.mesh(state.object), moved=False)
-        return replace(shown.press, model=self.long_model, pose=pose, load=state.motion(shown.press.load))
+        bench = self.solver.bench(state.sensor)
+        model = self.long_model if self.long_model in bench.models else bench.models[0]
+        if not state.moves or not bench.follows(model) or isinstance(shown.press.load, str):
+            return replace(shown.press, model=model)
+        pose = state.pose(self.solver.mesh(state.object), moved=False, middle_mm=bench.middle_mm)
+        return replace(shown.press, model=model, pose=pose, load=state.motion(shown.press.load))
 
     def _end_long(self):
         if self._long is not None:

@@ -1,7 +1,7 @@
 """Fields of a press of solids: what all bodies, frames and pairs in contact did, at the nodes and load step by load step."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,20 @@ class SolidFields:
     object_displacement_mm: np.ndarray = _array("mm", "step", "object_node", _XYZ)
     """(s, r, 3) of the same nodes."""
 
+    @classmethod
+    def of_displacement(cls, mesh: SolidMesh, displacement_mm: np.ndarray, **known: Any) -> "SolidFields":
+        """Fields of a body by its displacement (s, n, 3) in mm and what else is known, by names; what is not is nan.
+
+        Without names of `frames` and `pairs` there are none.
+        """
+        names = {"frames": known.pop("frames", ()), "pairs": known.pop("pairs", ())}
+        sizes = {"step": len(displacement_mm), "node": len(mesh.points), "frame": len(names["frames"]), "pair": len(names["pairs"]),
+                 _XYZ: 3, "load": 6, _RANGE: 2, "object_corner": 3}
+        unknown = {one.name: np.full([sizes.get(name, 0) for name in one.metadata["dimensions"]], np.nan)
+                   for one in fields(cls) if one.metadata}
+        unknown["object_triangles"] = np.zeros((0, 3), dtype=int)
+        return cls(mesh=mesh, **names, **unknown | {"displacement_mm": displacement_mm} | known)
+
     def load(self, frame: str) -> np.ndarray:
         """Loads (s, 6) of a frame by its name. InputError lists the names where there is none of it."""
         if frame not in self.frames:
@@ -88,7 +102,7 @@ def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidFields:
         raise InputError("There is no load step to keep; solve one.")
     n = len(body.mesh.points)
     surfaces = [body.surface_nodes(frame.name) for frame in body.frames if frame.nodes.min() >= n]
-    fields = [nodal_fields(body, step.state) for step in steps]
+    nodal = [nodal_fields(body, step.state) for step in steps]
     contacts = [[contact_at_nodes(*one, n) for one in zip(body.pairs, step.state.histories, step.state.contacts, strict=True)]
                 for step in steps]
     pressure, traction, slip = (np.array([[one[k] for one in step] for step in contacts]) for k in range(3))
@@ -102,7 +116,7 @@ def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidFields:
         frame_way_mm=np.array([[pose.translation for pose in step.state.poses] for step in steps]).reshape(len(steps), -1, 3),
         contact_pressure_mpa=pressure.reshape(len(steps), -1, n), contact_slip_mm=slip.reshape(len(steps), -1, n),
         contact_traction_mpa=traction.reshape(len(steps), -1, n, 3),
-        volume_ratio=np.array([J for J, _ in fields]), von_mises_mpa=np.array([mises for _, mises in fields]),
+        volume_ratio=np.array([J for J, _ in nodal]), von_mises_mpa=np.array([mises for _, mises in nodal]),
         increments=each(lambda step: step.increments), volume_ratio_range=each(lambda step: step.volume_ratio),
         stretch_range=each(lambda step: step.stretch), work_mj=each(lambda step: step.work_mj),
         dissipated_mj=each(lambda step: step.dissipated_mj), strain_energy_mj=each(lambda step: step.state.strain_energy),
