@@ -1,9 +1,15 @@
-"""Prepared data of a sensor's fast models, computed once for a sensor and kept in the user's cache."""
+"""Prepared data of a sensor's fast models, computed once for a sensor and kept in the user's cache.
+
+What is small and takes long is shipped for the package's own sensors, under the same names (`scripts/write_prepared.py`): a name is
+the digest of the values that its contents depend on, so another geometry or material never finds it.
+"""
 
 import contextlib
 import math
 from collections.abc import Mapping
 from functools import cache
+from importlib import resources
+from pathlib import Path
 
 from softtact.checksums import check, seal
 from softtact.errors import InputError, OutputError, SofttactError
@@ -18,6 +24,7 @@ from softtact.progress import announce
 from softtact.sensors.frusta import Friction, SensorSpec
 from softtact.sensors.specification import AnySpec
 
+SHIPPED = Path(str(resources.files("softtact.press"))) / "data"
 _POINTS = 1881  # of the paper's map
 _FOUNDATION_TAKES = 30, 1.5     # seconds for the paper's map, which grow with this power of the number of a map's points
 _ELASTIC_TAKES = 14, 2.0     # the same of the elastic model, on one core
@@ -62,23 +69,36 @@ def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceComp
 def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}; cached by the values that it depends on."""
     return _cached("foundation", _of_foundation(spec, laws), FoundationCompliance,
-                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
+                   f"{spec.name}: computing the slab's compliance, once for this sensor and these laws "
                    f"({_about(spec, *_FOUNDATION_TAKES)})",
                    lambda: foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
-                                                 threads=threads))
+                                                 frustum=cached_frustum_law(spec, laws["dielectric"]), threads=threads))
 
 
-def cached_frustum_law(spec: SensorSpec, law: Law) -> FrustumLaw:
-    """The `FrustumLaw` of a sensor's frusta with bonded tips; cached by the values that it depends on."""
-    bonded = spec.model_copy(update={"tips_bonded": True, "friction": Friction()})
-    return _cached("frustum", [repr(spec.dielectric.frusta), spec.dielectric.sheet_thickness_mm, repr(law)], FrustumLaw,
+def cached_frustum_law(spec: SensorSpec, law: Law, *, bonded: bool = False) -> FrustumLaw:
+    """The `FrustumLaw` of a sensor's frusta; shipped, or cached by the values that it depends on.
+
+    bonded: of frusta whose tips are held, whatever those of the sensor are
+    """
+    if bonded:
+        spec = spec.model_copy(update={"tips_bonded": True, "friction": Friction()})
+    return _cached("frustum", _of_frustum(spec, law), FrustumLaw,
                    f"{spec.name}: computing the law of a frustum, once for frusta of this kind ({in_words(_FRUSTUM_TAKES)})",
-                   lambda: frustum_law(bonded, law))
+                   lambda: frustum_law(spec, law))
+
+
+def shipped_frustum_law(spec: SensorSpec, law: Law) -> Path:
+    """Where the package has the `FrustumLaw` of a sensor's frusta, if it has it."""
+    return SHIPPED / _name("frustum", _of_frustum(spec, law))
+
+
+def _of_frustum(spec, law):
+    return [repr(spec.dielectric.frusta), spec.dielectric.sheet_thickness_mm, spec.tips_bonded, repr(spec.friction), repr(law)]
 
 
 def seconds_to_prepare_foundation(spec: SensorSpec, laws: Mapping[str, Law]) -> float:
     """Estimated time of `cached_foundation` on two cores; 0 if it is cached."""
-    return 0.0 if _is_there("foundation", _of_foundation(spec, laws)) else _seconds(spec, *_FOUNDATION_TAKES)
+    return 0.0 if _files("foundation", _of_foundation(spec, laws)) else _seconds(spec, *_FOUNDATION_TAKES)
 
 
 def _of_foundation(spec, laws):
@@ -99,28 +119,30 @@ def _seconds(spec, seconds, power):
     return seconds * (math.prod(spec.map_shape) / _POINTS) ** power
 
 
-def _file(kind, values):
-    return cache_folder() / f"{kind}-{digest([_FORMAT, *values])}.npz"
+def _name(kind, values):
+    return f"{kind}-{digest([_FORMAT, *values])}.npz"
 
 
-def _is_there(kind, values):
+def _files(kind, values):
+    """The files with these values, of which there may be one in the package and one in the user's cache."""
+    folders = [SHIPPED]
     with contextlib.suppress(OutputError):
-        return _file(kind, values).exists()
-    return False
+        folders.append(cache_folder())
+    return [path for folder in folders if (path := folder / _name(kind, values)).exists()]
 
 
 def _cached(kind, values, cls, message, compute):
     """The prepared data of a file; computed, with a word, where the file is missing or damaged, and kept where that is possible."""
-    if _is_there(kind, values):
+    for path in _files(kind, values):
         try:
-            _seal(_file(kind, values))
-            return cls.load(_file(kind, values))
+            _seal(path)
+            return cls.load(path)
         except InputError as error:
             _warn(f"{error} It is computed again.")
     announce(message)
     prepared = compute()
     try:
-        path = _file(kind, values)
+        path = cache_folder() / _name(kind, values)
         with atomic_path(path) as temporary:
             prepared.save(temporary)
         return cls.load(path)

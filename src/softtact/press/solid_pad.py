@@ -188,7 +188,7 @@ class SolidPad:
         """The law of frusta with bonded tips; the item lets tips slide where they may."""
         self.sensor.need_elastic("frusta", ["dielectric"])
         known = self.sensor.prepared_models.get("frustum")
-        return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"])
+        return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"], bonded=True)
 
     def _parts_over(self, axis: int, number: int) -> np.ndarray:
         """Numbers of the ends of the elements over a frustum, by its number along an axis."""

@@ -1,0 +1,66 @@
+"""What the package ships of its sensors' fast models is what would be computed, and is used for these values alone."""
+
+import shutil
+
+import numpy as np
+import pytest
+from write_prepared import frustum_files
+
+from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
+from softtact.press import cache
+from softtact.sensors.frusta import Friction
+
+FILES = frustum_files()
+ROUND_OFF = 1e-6     # relative: the cell is solved to 1e-7 N of some 0.1 N
+SENSORS = pytest.mark.parametrize("path", FILES, ids=[sensor.spec.name for sensor in FILES.values()])
+
+
+@pytest.fixture
+def computed(tmp_path, monkeypatch):
+    """The sensors whose frusta's law was computed, in place of computing it; the user's cache is empty."""
+    specs = []
+    law = FrustumLaw.load(next(iter(FILES)))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(cache, "frustum_law", lambda spec, _: specs.append(spec) or law)
+    cache._warn.cache_clear()
+    return specs
+
+
+@SENSORS
+def test_the_frusta_of_the_packages_sensors_need_no_computing(path, computed):
+    sensor = FILES[path]
+    law = cache.cached_frustum_law(sensor.spec, sensor.laws["dielectric"])
+    np.testing.assert_array_equal(law.force_n, FrustumLaw.load(path).force_n)
+    assert not computed
+
+
+def test_a_law_that_was_shipped_for_other_values_is_not_used(computed):
+    sensor = next(one for one in FILES.values() if one.spec.name == "coro")
+    laws, frusta = sensor.laws, sensor.spec.dielectric.frusta.model_copy(update={"height_mm": 0.51})
+    higher = sensor.spec.model_copy(update={"dielectric": sensor.spec.dielectric.model_copy(update={"frusta": frusta})})
+    sliding = sensor.spec.model_copy(update={"tips_bonded": False, "friction": Friction(board=0.3)})
+    for spec, law in [(higher, laws["dielectric"]), (sliding, laws["dielectric"]), (sensor.spec, laws["cover"])]:
+        cache.cached_frustum_law(spec, law)
+    assert computed == [higher, sliding, sensor.spec]
+
+
+def test_a_damaged_file_of_the_package_is_replaced_in_the_users_cache(tmp_path, monkeypatch, computed):
+    path, sensor = next(iter(FILES.items()))
+    monkeypatch.setattr(cache, "SHIPPED", tmp_path / "shipped")
+    damaged = tmp_path / "shipped" / path.name
+    damaged.parent.mkdir()
+    shutil.copy(path, damaged)
+    content = bytearray(damaged.read_bytes())
+    content[1000] ^= 1
+    damaged.write_bytes(content)
+    for _ in range(2):
+        cache.cached_frustum_law(sensor.spec, sensor.laws["dielectric"])
+    assert len(computed) == 1
+
+
+@pytest.mark.slow
+@SENSORS
+def test_a_law_that_is_shipped_is_the_one_that_is_computed(path):
+    shipped, sensor = FrustumLaw.load(path).arrays(), FILES[path]
+    for name, values in frustum_law(sensor.spec, sensor.laws["dielectric"]).arrays().items():
+        np.testing.assert_allclose(values, shipped[name], rtol=0, atol=ROUND_OFF * np.abs(shipped[name]).max(), err_msg=name)
