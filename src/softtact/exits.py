@@ -1,6 +1,8 @@
 """How a program ends: one sentence on stderr for what a user can act upon, and an exit status."""
 
+import atexit
 import errno
+import gc
 import os
 import sys
 from collections.abc import Callable
@@ -22,6 +24,7 @@ _NO_MEMORY = "there is not enough memory{}; use a coarser mesh, fewer presses at
 
 def run_to_status(name: str, action: Callable[[], None]) -> int:
     """Run `action` with SIGTERM as an interrupt; return its exit status after its sentence, which begins with `name`."""
+    atexit.register(gc.freeze)     # else Python looks for cycles among all modules' objects as it ends, a third of a second
     try:
         with sigterm_interrupts(), place_for_kernels():
             action()

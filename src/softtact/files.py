@@ -113,25 +113,6 @@ class _Unfailing(io.FileIO):
             return self.tell() if size is None else size
 
 
-class _OnceLoader(yaml.SafeLoader):
-    """PyYAML's safe loader, made to refuse a duplicate key in a mapping; PyYAML silently keeps the last."""
-
-    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        """The node of a mapping before merges (`<<`), since a mapping may override a merged key."""
-        node = super().compose_mapping_node(anchor)
-        lines: dict[Any, int] = {}
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode) or key.tag == "tag:yaml.org,2002:merge":
-                continue
-            name = self.construct_object(key)
-            if name in lines:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key.value!r} stands in line {lines[name]} and again in line {key.start_mark.line + 1}; "
-                    "keep one")
-            lines[name] = key.start_mark.line + 1
-        return node
-
-
 def read_yaml(path: str | Path, *, missing: str) -> Any:
     """The content of a YAML file. `missing`: what to do if the file does not exist, for the error message.
 
@@ -139,14 +120,35 @@ def read_yaml(path: str | Path, *, missing: str) -> Any:
     """
     check_input(path, "yaml", missing=missing)
     try:
-        loader = _OnceLoader(Path(path).read_text(encoding="utf-8"))
+        loader = yaml.CSafeLoader(Path(path).read_text(encoding="utf-8"))
         node = loader.get_single_node()
         if node is None:
             return None
         check_limit(path, "values", _written_out(node, {}))
+        _refuse_twice(node, loader)
         return loader.construct_document(node)
     except (UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:     # ValueError: 2001-99-99 is no date
         raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+
+
+def _refuse_twice(root, loader):
+    """Refuse a mapping with a key twice, of which PyYAML would keep the last one. Merges (`<<`) may be overridden."""
+    waiting, seen = [root], set()
+    while waiting:
+        node = waiting.pop()
+        if id(node) in seen or not isinstance(node, yaml.CollectionNode):
+            continue
+        seen.add(id(node))
+        waiting += [part for one in node.value for part in (one if isinstance(one, tuple) else (one,))]
+        lines: dict[Any, int] = {}
+        for key, _ in node.value if isinstance(node, yaml.MappingNode) else ():
+            if not isinstance(key, yaml.ScalarNode) or key.tag == "tag:yaml.org,2002:merge":
+                continue
+            name = loader.construct_object(key)
+            if name in lines:
+                raise ValueError(f"the key {key.value!r} stands in line {lines[name]} and again in line {key.start_mark.line + 1}; "
+                                 "keep one")
+            lines[name] = key.start_mark.line + 1
 
 
 def _written_out(node, known):

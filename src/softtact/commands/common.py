@@ -138,7 +138,7 @@ def check_pictures(*paths: Path | None) -> None:
 def import_trimesh() -> None:
     """Import trimesh without packages that it loads wherever they are, which takes a third of a second, and that no command uses
     through it. In a command's process alone: trimesh works without them from then on."""
-    hidden = [name for name in ("cascadio", "meshio", "networkx") if name not in sys.modules]
+    hidden = [name for name in ("cascadio", "meshio", "networkx", "scipy.ndimage", "scipy.optimize") if name not in sys.modules]
     try:
         sys.modules |= dict.fromkeys(hidden)     # type: ignore[arg-type]
         import trimesh  # noqa: F401

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.ndimage import binary_erosion
 
 from softtact.compiled import compiled
 from softtact.contact.object_points import ObjectPoints
@@ -158,6 +157,8 @@ def patches_of(points: ObjectPoints, grid: NodeGrid, shared: bool, *, beside_edg
         square = square.ravel()
         whole = np.minimum(points.covered, points.as_deep(0.0).covered) > _WHOLE
         if beside_edge:
+            from scipy.ndimage import binary_erosion
+
             whole &= binary_erosion(_mask(points, grid), np.ones((3, 3)), iterations=beside_edge).ravel()[points.nodes]
         count = np.bincount(square, weights=whole)
         low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)

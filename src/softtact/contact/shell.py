@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.errors import ConvergenceError
@@ -103,4 +102,6 @@ def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_o
 
     if below(largest) <= 0:
         return forces_n
+    from scipy.optimize import brentq
+
     return np.minimum(forces_n, brentq(below, 0.0, largest, xtol=_EXACT * largest))

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from trimesh import Trimesh
 
+from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, InputError, ShellWarning, TimeLimitError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
 from softtact.press.cache import in_words
 from softtact.press.count_error import FOUNDATION, hyperelastic_counts
 from softtact.press.fast import press_elastic, press_on_foundation
-from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
@@ -33,6 +33,15 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 POLICIES = ("error", "paper")
+
+
+def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, control: RunControl) -> PressResult:
+    """`press.hyperelastic.press_hyperelastic`, whose forty modules load when it is first asked for."""
+    from softtact.press import hyperelastic
+
+    return hyperelastic.press_hyperelastic(sensor, placed, forces, control)
+
+
 # The models that press straight down by force: from a placed object and forces to a `PressResult`.
 PRESSES: dict[str, Callable[["Sensor", Trimesh, np.ndarray, RunControl], PressResult]] = {
     "elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}

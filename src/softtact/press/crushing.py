@@ -12,7 +12,7 @@ import numpy as np
 from trimesh import Trimesh
 
 from softtact.errors import ConvergenceError, CrushedWarning
-from softtact.models.hyperelastic.newton import FULL_POCKET
+from softtact.models.hyperelastic.mesh_settings import FULL_POCKET
 from softtact.press.fast import press_on_foundation
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult

@@ -15,7 +15,6 @@ from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
-from softtact.imaging.depth_image import MovedObject
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
@@ -342,6 +341,8 @@ def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
 
 def _of_motion(sensor, moved, seconds, placed, motion):
     """The result of an `ElasticMotion` of a placed mesh along a `Motion`, or of its first steps."""
+    from softtact.imaging.depth_image import MovedObject
+
     unknown, spec = np.full(len(moved.depth_mm), np.nan), sensor.spec
     touch = HeightField.of(placed).first_touch_mm(spec.map_x_mm, spec.map_y_mm)
     followed = MovedObject(placed, touch, motion.aside_mm[:len(unknown)], moved.depth_mm, np.zeros(len(unknown)))

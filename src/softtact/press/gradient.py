@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.height_rates import gap_rates, touch_rates
@@ -19,8 +18,6 @@ from softtact.contact.object_points import ObjectPoints
 from softtact.contact.underside import Underside
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import InputError
-from softtact.geometry.meshes import place
-from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
 from softtact.models.foundation.compliance import FoundationCompliance
@@ -28,6 +25,7 @@ from softtact.models.foundation.dof_maps import Places
 from softtact.models.foundation.gradient import Balance, Tangent
 from softtact.models.foundation.solve import FoundationMaps, settled_contacts
 from softtact.press.cache import cached_compliance, cached_foundation
+from softtact.press.objects import Origin
 from softtact.readout.capacitance import felt_displacement
 from softtact.readout.capacitance_rates import counts_rates, felt_rates
 from softtact.readout.taxels import Capacitance, counts_of
@@ -35,7 +33,6 @@ from softtact.unknown_names import unknown
 
 if TYPE_CHECKING:
     from softtact.press.result import PressResult
-    from softtact.press.sensor import Sensor
 
 _POSE = {"x": "mm", "y": "mm", "rx": "degree", "ry": "degree", "rz": "degree"}
 _UNITS = _POSE | {"force": "N", "young": "MPa", "thickness": "mm"}
@@ -77,25 +74,6 @@ class Gradient:
                              f"{self.of}.")
         product: np.ndarray = np.asarray(cotangent)[..., None] * self.values
         return product.sum(axis=tuple(range(1, product.ndim - 1)))
-
-
-@dataclass(frozen=True)
-class Origin:
-    """What a press by forces was of."""
-
-    sensor: "Sensor"
-    """Its sensor."""
-    mesh: trimesh.Trimesh
-    """The object as it was given, in mm."""
-    pose: Pose
-    """Its pose in the sensor frame."""
-    mesh_hash: int
-    """Of the mesh when it was pressed."""
-
-    @property
-    def underside(self) -> HeightField:
-        """The object's underside in its pose; found again, as it takes more memory than a result."""
-        return HeightField(place(self.mesh, pose=self.pose))
 
 
 def gradient(result: "PressResult", of: str, by: Sequence[str]) -> Gradient:

@@ -1,6 +1,7 @@
 """Loading and pressing sensors of each kind: one entry of `KINDS` for each kind of `sensors.specification.KINDS`.
 
 To add a kind from outside the package, add a class of specification and a `Kind` to these registries under the kind's name.
+Models and readouts that few presses need are imported inside functions: a command starts a third of a second sooner.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,26 +18,21 @@ from softtact.geometry.meshes import check_over_sensor, default_pose, place
 from softtact.linalg.workers import threads_of_blas
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
-from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.build import build_plain_body, build_sensor_body
 from softtact.press import choice
 from softtact.press.creep import at_times, refuse_creep, slow_press
 from softtact.press.fast import press_elastic_motion
-from softtact.press.gel import press_gel
-from softtact.press.gradient import Origin
-from softtact.press.hyperelastic import press_hyperelastic
 from softtact.press.making import layered_surface
-from softtact.press.objects import placed_object
+from softtact.press.objects import Origin, placed_object
 from softtact.press.result import PressResult
-from softtact.press.solid import load_solid, press_body, press_pad, surface_of
 from softtact.press.task import PressTask, checked_forces
 from softtact.press.validity import flag_buried, flag_overloaded
-from softtact.readout import camera, depth, markers, points, strip, taxels  # registered as they are imported  # noqa: F401
-from softtact.readout.registry import PlaneMotion, SurfaceMotion
+from softtact.readout import points, taxels  # registered as they are imported  # noqa: F401
+from softtact.readout.registry import PlaneMotion, SurfaceMotion, register_later
 from softtact.sensors.library import material_file
-from softtact.sensors.specification import AnySpec
+from softtact.sensors.specification import AnySpec, SensorSpec
 
 if TYPE_CHECKING:
+    from softtact.models.hyperelastic.body import LayeredBody
     from softtact.press.sensor import Sensor
 
 Press = Callable[["Sensor", PressTask], PressResult]
@@ -53,7 +49,7 @@ class Kind:
     """Functions that press it by the names of the models, including `auto`."""
     at_rest: "Callable[[Sensor], SurfaceMotion]"
     """Its surface before any press, on which readouts are tried."""
-    body: Callable[..., LayeredBody] | None = None
+    body: "Callable[..., LayeredBody] | None" = None
     """The body of the hyperelastic model, where that model presses it."""
 
     def press(self, model: str, sensor: str) -> Press:
@@ -91,10 +87,10 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
         raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
                          "rigid mesh.")
     if sensor.spec.edge.far and model == "elastic":
-        return _by_motion(sensor, task, press_gel)
+        return _on_gel(sensor, task)
     if _by_force_alone(task.motion):
         return _by_forces(sensor, task, choice.PRESSES[model], threads=task.control.threads if model == "elastic" else 1)
-    motions = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
+    motions = {"elastic": press_elastic_motion, "hyperelastic": choice.press_hyperelastic}
     if model not in motions:
         raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic, hyperelastic or "
                          "solid for this motion, or give force_n.")
@@ -110,13 +106,33 @@ def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
     On a gel: elastic for all that it can follow.
     """
     if sensor.spec.edge.far and not task.soft and _flat(task.motion):
-        result = _by_motion(sensor, task, press_gel)
+        result = _on_gel(sensor, task)
         return replace(result, selection_reason="a gel's sides are far: the elastic model, which gives traction and slip")
     if task.soft or task.motion.turns or task.motion.loaded_aside:
-        return press_pad(sensor, task)
+        return press_solid(sensor, task)
     if not _by_force_alone(task.motion):
-        return _by_motion(sensor, task, press_hyperelastic)
+        return _by_motion(sensor, task, choice.press_hyperelastic)
     return _by_forces(sensor, task, partial(choice.press_auto, policy=task.policy, tolerance_mm=task.tolerance_mm))
+
+
+def _on_gel(sensor, task):
+    from softtact.press.gel import press_gel
+
+    return _by_motion(sensor, task, press_gel)
+
+
+def press_solid(sensor: "Sensor", task: PressTask) -> PressResult:
+    """A press by the solid model, of a sensor of any kind."""
+    from softtact.press import solid
+
+    return (solid.press_pad if sensor.spec.has_layers else solid.press_body)(sensor, task)
+
+
+def layered_body(spec: AnySpec, **options: Any) -> "LayeredBody":
+    """The body of the hyperelastic model: with frusta, or of plain layers."""
+    from softtact.models.hyperelastic.build import build_plain_body, build_sensor_body
+
+    return build_sensor_body(spec, **options) if isinstance(spec, SensorSpec) else build_plain_body(spec, **options)
 
 
 def _flat(motion):
@@ -185,23 +201,50 @@ def layers_at_rest(sensor: "Sensor") -> SurfaceMotion:
     return replace(surface, plane=PlaneMotion.at_rest(sensor.spec.map_x_mm, sensor.spec.map_y_mm))
 
 
-_LAYERS = Kind(load=load_layers, at_rest=layers_at_rest, models={
-    "auto": press_layers_auto, **{model: partial(press_layers, model=model) for model in choice.PRESSES}, "solid": press_pad})
+_LAYERS = Kind(load=load_layers, at_rest=layers_at_rest, body=layered_body, models={
+    "auto": press_layers_auto, **{model: partial(press_layers, model=model) for model in choice.PRESSES}, "solid": press_solid})
 
 
 # --- sensors of kind solid ---
 
 
 def _load_solid(spec, laws):
+    from softtact.press.solid import load_solid
+
     elements, laws = load_solid(spec, laws)
     return {"spec": spec, "laws": laws, "elements": elements}
 
 
 def solid_at_rest(sensor: "Sensor") -> SurfaceMotion:
     """The surface of a solid at rest."""
+    from softtact.press.solid import surface_of
+
     return surface_of(sensor, [np.zeros_like(sensor.elements.points)])      # type: ignore[union-attr]
 
 
 KINDS: dict[str, Kind] = {
-    "frusta": replace(_LAYERS, body=build_sensor_body), "layers": replace(_LAYERS, body=build_plain_body),
-    "solid": Kind(load=_load_solid, at_rest=solid_at_rest, models={"auto": press_body, "solid": press_body})}
+    "frusta": _LAYERS, "layers": _LAYERS,
+    "solid": Kind(load=_load_solid, at_rest=solid_at_rest, models={"auto": press_solid, "solid": press_solid})}
+
+
+# --- readouts of files that few sensors name ---
+
+
+def _camera() -> None:
+    from softtact.readout import camera  # noqa: F401
+
+
+def _depth() -> None:
+    from softtact.readout import depth  # noqa: F401
+
+
+def _markers() -> None:
+    from softtact.readout import markers  # noqa: F401
+
+
+def _strip() -> None:
+    from softtact.readout import strip  # noqa: F401
+
+
+for _kind, _load in {"camera": _camera, "depth": _depth, "markers": _markers, "strip": _strip}.items():
+    register_later(_kind, _load)

@@ -14,12 +14,13 @@ from softtact.contact.motion import FREEDOMS, Motion
 from softtact.contact.shell import Shell
 from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
-from softtact.geometry.meshes import misses_sensor
+from softtact.geometry.meshes import misses_sensor, place
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 
 if TYPE_CHECKING:
     from softtact.imaging.pinhole import Pinhole
+    from softtact.press.sensor import Sensor
 
 OBJECT = "object"  # the frame of the pressed object
 _MIRROR = np.diag([1.0, 1.0, -1.0])
@@ -188,3 +189,22 @@ def _turn_down(direction):
     x = np.cross(aside, down)
     x /= np.linalg.norm(x)
     return np.array([x, np.cross(down, x), down])
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a press by forces was of, for its gradient."""
+
+    sensor: "Sensor"
+    """Its sensor."""
+    mesh: trimesh.Trimesh
+    """The object as it was given, in mm."""
+    pose: Pose
+    """Its pose in the sensor frame."""
+    mesh_hash: int
+    """Of the mesh when it was pressed."""
+
+    @property
+    def underside(self) -> HeightField:
+        """The object's underside in its pose; found again, as it takes more memory than a result."""
+        return HeightField(place(self.mesh, pose=self.pose))

@@ -19,7 +19,7 @@ from softtact.fem.solid_mesh import SolidMesh
 from softtact.files import PROVENANCE, read_arrays, read_dataset, write_dataset
 from softtact.inputs import in_one_sentence
 from softtact.models.solid.result import SolidFields
-from softtact.press.objects import PlacedObject
+from softtact.press.objects import Origin, PlacedObject
 from softtact.readout.points import labelled_points
 from softtact.readout.registry import Readings, labelled
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
-    from softtact.press.gradient import Gradient, Origin
+    from softtact.press.gradient import Gradient
 
 
 _ABSENT: Any = None      # a field that a sensor or a model does not have
@@ -142,7 +142,7 @@ class PressResult:
     """Fields of the solids, of a press by the solid model: mesh, nodal displacement, stress, contact pressure, loads of frames."""
     placed_object: PlacedObject | None = None
     """The object where it is at each load step, where `Sensor.press` was asked to keep it; it is written with the maps."""
-    origin: "Origin | None" = field(default=None, repr=False, compare=False)
+    origin: Origin | None = field(default=None, repr=False, compare=False)
     """The sensor and the object of a press by forces, for `gradient`; neither written with the maps nor sent to other processes."""
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import trimesh
@@ -20,19 +20,18 @@ from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
-from softtact.models.hyperelastic import newton
-from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.mesh_settings import MeshSettings, NewtonSettings
 from softtact.press.cache import cached_compliance, cached_foundation, seconds_to_prepare_foundation
-from softtact.press.gel import wide_layer
 from softtact.press.kinds import KINDS, MODELS
-from softtact.press.many import Batch, press_many
 from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
 from softtact.press.task import BatchOptions, PressOptions, checked_forces, motion_of, refuse_unknown, task_of
 from softtact.readout.registry import Readout, make_readout, readings_of
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import read_any_spec
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.body import LayeredBody
 
 __all__ = ["MODELS", "Sensor", "load_sensor", "load_solid_sensor"]
 
@@ -76,7 +75,7 @@ class Sensor:
     """By layer or region."""
     mesh: MeshSettings = MeshSettings()
     """Resolution of the hyperelastic model's body."""
-    solver: newton.NewtonSettings = newton.NewtonSettings()
+    solver: NewtonSettings = NewtonSettings()
     """Tolerances of that model."""
     prepared_models: dict[str, Any] = field(default_factory=dict)
     """{"elastic": Compliance, "foundation": FoundationCompliance}, prepared data of the fast models; else from the user's cache."""
@@ -127,6 +126,8 @@ class Sensor:
         meshes: objects, one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
         options: see `BatchOptions`
         """
+        from softtact.press.many import Batch, press_many
+
         refuse_unknown(options, BatchOptions)
         if isinstance(meshes, trimesh.Trimesh | SoftObject):
             meshes = [meshes] * (1 if poses is None else len(poses))
@@ -149,10 +150,17 @@ class Sensor:
         if model == "foundation":
             self.need_elastic("foundation model")
         if model not in self.prepared_models:
-            self.prepared_models[model] = (cached_foundation(self.spec, self.laws, threads=threads) if model != "elastic"
-                                           else wide_layer(self.spec) if self.spec.edge.far
-                                           else cached_compliance(self.spec, threads=threads))
+            self.prepared_models[model] = self._prepare(model, threads)
         return self.prepared_models[model]
+
+    def _prepare(self, model, threads):
+        if model != "elastic":
+            return cached_foundation(self.spec, self.laws, threads=threads)
+        if not self.spec.edge.far:
+            return cached_compliance(self.spec, threads=threads)
+        from softtact.press.gel import wide_layer
+
+        return wide_layer(self.spec)
 
     def need_elastic(self, what: str, layers: Sequence[str] | None = None) -> None:
         """Raise InputError where the material of one of the layers, by default of any, softens or relaxes: `what` is elastic."""
@@ -169,7 +177,7 @@ class Sensor:
             return 0.0
         return seconds_to_prepare_foundation(self.spec, self.laws)
 
-    def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
+    def body(self, *, threads: int = 1, surface: HeightField | None = None) -> "LayeredBody":
         """The `LayeredBody` that the hyperelastic model presses on."""
         self.need_elastic("hyperelastic model")
         build, device = KINDS[self.spec.kind].body, find_device(self.device, library="warp")

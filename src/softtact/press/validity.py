@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter
 
-from softtact.models.hyperelastic.newton import FULL_POCKET
+from softtact.models.hyperelastic.mesh_settings import FULL_POCKET
 from softtact.press.result import PressResult
 from softtact.words import plain
 
@@ -62,8 +61,13 @@ def resolved_elastic(fields_mm: np.ndarray, *, dielectric_mm: float) -> np.ndarr
     Under a wall or a pin the surface is as steep as the nodes are close. Once it is deep in a dielectric, dielectric_mm thick,
     whose capacitance then rises without bound, readings would depend on how the nodes happen to lie.
     """
-    deepest, around = fields_mm.max(axis=(1, 2)), uniform_filter(fields_mm, (0, 3, 3)).max(axis=(1, 2))
-    return (around >= _AROUND * deepest) | (deepest < _DEEPEST_NARROW * dielectric_mm)
+    deepest = fields_mm.max(axis=(1, 2))
+    shallow: np.ndarray = deepest < _DEEPEST_NARROW * dielectric_mm
+    if shallow.all():
+        return shallow
+    from scipy.ndimage import uniform_filter
+
+    return shallow | (uniform_filter(fields_mm, (0, 3, 3)).max(axis=(1, 2)) >= _AROUND * deepest)
 
 
 def flags_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustum_mm: float, thickness_mm: float,

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from softtact.imaging.pinhole import Pinhole
 
 _KINDS: dict[str, type] = {}
+_LATER: dict[str, Callable[[], object]] = {}     # functions that register a kind
 _Class = TypeVar("_Class", bound=type)
 
 
@@ -120,11 +121,18 @@ def register(kind: str) -> Callable[[_Class], _Class]:
     return add
 
 
+def register_later(kind: str, load: Callable[[], object]) -> None:
+    """Let `load`, which registers a kind, be called when a sensor first names it: a camera's modules take a tenth of a second."""
+    _LATER[kind] = load
+
+
 def make_readout(name: str, entry: ReadoutEntry, *, where: str = "sensor") -> Readout:
     """The readout of an entry of a sensor's file. Raises InputError that names the field: an unknown kind, a key that it lacks."""
     place = f"{where}, at 'readouts.{name}'"
+    if entry.kind not in _KINDS and entry.kind in _LATER:
+        _LATER[entry.kind]()
     if entry.kind not in _KINDS:
-        known = sorted(_KINDS)
+        known = sorted({*_KINDS, *_LATER})
         raise InputError(f"{place}: there is no kind {entry.kind!r}{nearest(entry.kind, known)}; use one of {', '.join(known)}.")
     cls, given = _KINDS[entry.kind], dict(entry.model_extra or {})
     try:

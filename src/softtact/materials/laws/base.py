@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from scipy.optimize import brentq
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.materials.laws.volumetric import Quadratic, VolumetricFunction
@@ -188,6 +187,8 @@ def rest_of(mode: str) -> float:
 
 def _root(function):
     """Root of an increasing function of J > 0, bracketed outwards from J = 1."""
+    from scipy.optimize import brentq  # a sixth of a second to load, and no fast model asks for a root
+
     low, high = 0.9, 1.1
     while function(low) > 0 and low > 1e-6:
         low *= 0.7

@@ -15,7 +15,6 @@ Here     psi = sum_k 2 mu_k/alpha_k^2 (l_1^alpha_k + l_2^alpha_k + l_3^alpha_k -
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
 from softtact.compiled import compiled
 from softtact.materials.laws.base import TEST_PATHS, IsochoricResponse, Law
@@ -71,6 +70,8 @@ class CompressibleLaw(Law):
 
     def _stretches(self, mode, stretch):
         """Principal stretches (3,), those of free directions such that they bear no stress."""
+        from scipy.optimize import brentq
+
         second = {"uniaxial": None, "equibiaxial": stretch, "planar": 1.0}[mode]
 
         def stress_across(log):

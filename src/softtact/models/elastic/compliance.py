@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 from scipy.linalg import cho_factor, cho_solve
 
 from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
@@ -105,6 +104,8 @@ class DraftCompliance(Compliance):
     """(2 ny - 1, 2 nx - 1) of the whole grid, with sides that are held."""
 
     def _fields(self, blocks, points, force):
+        from scipy.interpolate import RectBivariateSpline
+
         coarse = super()._fields(blocks, points, force)
         over = [(fine - 1) / (few - 1) for fine, few in zip(self.nodes, coarse.shape[1:], strict=True)]
         places = [np.arange(fine) / share for fine, share in zip(self.nodes, over, strict=True)]

@@ -14,11 +14,10 @@ A tie at single points would apply point loads, whose displacements grow without
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
-from scipy.interpolate import PchipInterpolator
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
@@ -26,14 +25,13 @@ from softtact.fem.elements import HEX27, QUAD9
 from softtact.fem.quadrature import gauss
 from softtact.files import read_arrays
 from softtact.materials.laws.base import Law
-from softtact.models.hyperelastic.build import build_unit_cell
-from softtact.models.hyperelastic.frusta import FrustumArray
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings
-from softtact.models.hyperelastic.path import press_load_steps
-from softtact.models.hyperelastic.states import SupportState
+from softtact.models.hyperelastic.mesh_settings import MeshSettings, NewtonSettings
 from softtact.models.newton import solve
 from softtact.sensors.frusta import SensorSpec
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.frusta import FrustumArray
+    from softtact.models.hyperelastic.states import SupportState
 
 _STEP_MM = 0.01        # largest movement of the root at once
 _TOLERANCE_N = 1e-7    # of the inner forces; forces on the root are about 1e-2 N
@@ -47,7 +45,7 @@ _PRESSURE_MPA = 2.0      # largest pressure on the cell: about five times that o
 class SingleFrustum:
     """The only frustum of a `FrustumArray`, first at rest; each `move` continues from the last state."""
 
-    def __init__(self, support: FrustumArray) -> None:
+    def __init__(self, support: "FrustumArray") -> None:
         self.support, self._displacement, self._place = support, np.zeros((1, support.nodes, 3)), np.zeros(3)
         self._x = support.coordinates[0][support.root, 0] - support.geometry.centres[0][0]
 
@@ -86,31 +84,31 @@ class SingleFrustum:
 
     # The frustum with a fixed root as a `Problem` of Newton's method.
 
-    def prepared(self, state: SupportState, iteration: int) -> SupportState:
+    def prepared(self, state: "SupportState", iteration: int) -> "SupportState":
         return state
 
-    def residual(self, state: SupportState) -> float:
+    def residual(self, state: "SupportState") -> float:
         return np.abs(self.support.inner_residual(state)).max()
 
-    def balanced(self, state: SupportState, residual: float) -> bool:
+    def balanced(self, state: "SupportState", residual: float) -> bool:
         return residual <= _TOLERANCE_N
 
-    def step(self, state: SupportState) -> tuple[SupportState, np.ndarray]:
+    def step(self, state: "SupportState") -> "tuple[SupportState, np.ndarray]":
         return state, self._newton_step(state, np.zeros((1, 3 * len(self._x))))
 
     def first_share(self, step: np.ndarray) -> float:
         return 1.0
 
-    def moved(self, state: SupportState, step: np.ndarray, share: float) -> SupportState | None:
+    def moved(self, state: "SupportState", step: np.ndarray, share: float) -> "SupportState | None":
         return self.support.evaluate(state.displacement + share * step)
 
-    def better(self, trial: SupportState, state: SupportState, residual: float) -> bool:
+    def better(self, trial: "SupportState", state: "SupportState", residual: float) -> bool:
         return trial.energy < state.energy or self.residual(trial) < residual
 
-    def accepted(self, state: SupportState, trial: SupportState) -> None:
+    def accepted(self, state: "SupportState", trial: "SupportState") -> None:
         """Nothing is kept from one step to the next."""
 
-    def recovered(self, state: SupportState) -> bool:
+    def recovered(self, state: "SupportState") -> bool:
         return False
 
     def _forces(self):
@@ -145,6 +143,8 @@ class FrustumLaw:
 
     @cached_property
     def _curve(self):
+        from scipy.interpolate import PchipInterpolator
+
         return PchipInterpolator(self.force_n, self.compression_mm)
 
     @cached_property
@@ -195,6 +195,8 @@ class FrustumLaw:
 
     @cached_property
     def _stiffness(self):
+        from scipy.interpolate import PchipInterpolator
+
         return PchipInterpolator(self.lateral_at_mm, self.stiffness)
 
     @cached_property
@@ -226,6 +228,8 @@ def frustum_law(spec: SensorSpec, law: Law, *, mesh: MeshSettings | None = None,
 
     mesh: `MeshSettings` of the cell; by default frusta of two rings (of one ring: 2 % too stiff)
     """
+    from softtact.models.hyperelastic.build import build_unit_cell  # not loaded for a law that is kept
+
     body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
     support = body.support
     root_xy, spread, mass = _root_mortar(support)
@@ -328,6 +332,8 @@ def _lateral_stiffness(support, largest_mm):
 
 def _cell_curve(spec, body, descent, largest_n):
     """Forces and compressions (f,) of the cell under a plate, from 0 up to `largest_n`, or to the last converged load step."""
+    from softtact.models.hyperelastic.path import press_load_steps
+
     plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
     plate.apply_translation([0, 0, 0.5])
     forces = np.geomspace(_FIRST_N, largest_n, int(np.ceil(_LEVELS_A_DECADE * np.log10(largest_n / _FIRST_N))))

@@ -12,6 +12,7 @@ from softtact.fem.extruded_mesh import CORE_RADIUS
 from softtact.sensors.frusta import SensorSpec
 from softtact.unknown_names import unknown
 
+FULL_POCKET = 0.8   # of a frustum's height: beyond, its pocket is full and contacts occur that are not modelled
 _OBJECT_SMOOTHING_MM = 1e-3
 _CORE_IN_ONE_RING = 0.6     # docs/notebook/2026-11-24-choice-of-the-meshes.md
 SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")

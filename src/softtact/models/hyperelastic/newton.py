@@ -8,7 +8,7 @@ import numpy as np
 from softtact.contact.edges import OVERRUN_MM
 from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.mesh_settings import NewtonSettings
+from softtact.models.hyperelastic.mesh_settings import FULL_POCKET, NewtonSettings
 from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 from softtact.models.newton import Solution, lowers_potential, solve
 
@@ -18,7 +18,6 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 # one so far. Those without Newton steps do not count: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': beyond, elements of the default mesh may be unstable
-FULL_POCKET = 0.8   # of a frustum's height: beyond, its pocket is full and contacts occur that are not modelled
 _ROUGH_SOON = 8     # iterations after which the rough tolerance applies beyond `DEEP`, or if it applied before an augmentation
 _NEARLY = 3.0      # factor of the allowed overlap if points are under an edge: their augmentation takes tens of steps
 

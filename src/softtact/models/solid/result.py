@@ -2,16 +2,18 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.contact.pair import ContactPair, PairHistory, PairState
 from softtact.errors import InputError
-from softtact.fem.elements import Element
 from softtact.fem.solid_mesh import ELEMENTS, SolidMesh
-from softtact.models.solid.body import SolidBody, SolidState
-from softtact.models.solid.path import SolidLoadStep
+
+if TYPE_CHECKING:
+    from softtact.contact.pair import ContactPair, PairHistory, PairState
+    from softtact.fem.elements import Element
+    from softtact.models.solid.body import SolidBody, SolidState
+    from softtact.models.solid.path import SolidLoadStep
 
 _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 _XYZ, _RANGE = "xyz", "least_largest"
@@ -95,7 +97,7 @@ class SolidFields:
         return np.where(np.isfinite(largest), largest, np.nan)
 
 
-def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidFields:
+def gathered(body: "SolidBody", steps: "Iterable[SolidLoadStep]") -> SolidFields:
     """The `SolidFields` of load steps."""
     steps = list(steps)
     if not steps:
@@ -131,7 +133,7 @@ def _names(body):
     return tuple(name if names.count(name) == 1 else f"{name} {number}" for number, name in enumerate(names, start=1))
 
 
-def nodal_fields(body: SolidBody, state: SolidState) -> tuple[np.ndarray, np.ndarray]:
+def nodal_fields(body: "SolidBody", state: "SolidState") -> tuple[np.ndarray, np.ndarray]:
     """Volume ratio J and von Mises stress of the Cauchy stress in MPa at the mesh's nodes (n,); nan where no element is.
 
     In each element the values at the points of quadrature are fitted by a linear function, which gives those at its nodes; a node
@@ -155,11 +157,11 @@ def nodal_fields(body: SolidBody, state: SolidState) -> tuple[np.ndarray, np.nda
     return J, np.maximum(mises, 0.0)      # an extrapolation may fall below
 
 
-def _elements(mesh: SolidMesh) -> list[Element]:
+def _elements(mesh: SolidMesh) -> "list[Element]":
     return [ELEMENTS[kind] for _, kind, nodes in mesh.cells if len(nodes)]
 
 
-def _linear_fit(element: Element, points: int) -> np.ndarray:
+def _linear_fit(element: "Element", points: int) -> np.ndarray:
     """Matrix (m, g) that takes values at the points of the rule of so many points to the nodes."""
     rule = next(rule for rule in (element.quadrature, element.reduced) if rule is not None and len(rule.weights) == points)
     return _linear(element.nodes) @ np.linalg.pinv(_linear(rule.points))
@@ -169,7 +171,7 @@ def _linear(x):
     return np.column_stack([np.ones(len(x)), x])
 
 
-def contact_at_nodes(pair: ContactPair, history: PairHistory, state: PairState, count: int
+def contact_at_nodes(pair: "ContactPair", history: "PairHistory", state: "PairState", count: int
                      ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pressure (n,) and force (n, 3) on a pair's surface per area at rest in MPa, and slip (n,) in mm, at `count` nodes.
 
