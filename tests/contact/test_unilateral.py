@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 from small_layer import THICKNESS, ball, flat_box, layer_compliance, placed, punch, underside
 
-from softtact.contact.unilateral import ContactSettings, active_set, press_elastic
+from softtact.contact.unilateral import ContactSettings, active_set, depth_on_springs, press_elastic
 from softtact.errors import ConvergenceError
 
 TOLERANCE_MM = 1e-6      # of a gap: the fast method's own criterion
@@ -142,3 +142,11 @@ def test_one_point_carries_everything():
 def test_a_load_step_that_does_not_settle_is_named():
     with pytest.raises(ConvergenceError, match="at 0.3 N in 1 iterations"):
         press_elastic(*layer_contact(SHAPES["sphere"]), FORCES, settings=ContactSettings(max_iterations=1))
+
+
+@pytest.mark.parametrize("load", [1e-9, 0.3, 40.0, 5e4])
+def test_springs_carry_exactly_the_force_at_their_depth(load):
+    rng = np.random.default_rng(2)
+    heights, area = np.round(rng.uniform(-2.0, 3.0, 200), 1), rng.uniform(0.1, 0.5, 200)
+    depth = depth_on_springs(heights, area, load)
+    assert (area * np.maximum(depth - heights, 0.0)).sum() == pytest.approx(load, rel=1e-9, abs=1e-14)

@@ -80,6 +80,14 @@ def test_a_wall_between_all_samples_of_the_surface_is_pressed(sensor):
         assert sensor.press(wall, force_n=0.5, model="elastic", label="").contact_area_mm2[0] > 0
 
 
+@pytest.mark.parametrize("slope", [0.3, 0.5, 2.0])
+def test_a_tip_between_four_points_presses_them_however_small_the_force(sensor, slope):
+    cone = trimesh.creation.cone(radius=2.0, height=2.0 * slope)
+    pose = Pose.from_values([0.15, 0.15, 2.0 * slope, 180.0, 0, 0])
+    result = sensor.press(cone, pose=pose, force_n=1e-5, model="elastic", label="")
+    assert result.contact_area_mm2[0] > 0 and result.indentation_mm[0] < 0.15
+
+
 def test_nothing_is_added_to_an_object_that_the_points_see():
     for mesh in (trimesh.creation.icosphere(subdivisions=4, radius=2.0), trimesh.creation.box((1.9, 2.3, 2.0)), walls(0.6)):
         surface = moved(mesh, 0.11)

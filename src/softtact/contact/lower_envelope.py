@@ -39,7 +39,7 @@ def lowest_over_lines(triangles: np.ndarray, x: np.ndarray, y: np.ndarray) -> tu
     """Heights (ny nx,) of the lowest triangle over each point, and its number (ny nx,), -1 for none."""
     lowest, number = np.full(len(y) * len(x), NO_CONTACT_MM), np.full(len(y) * len(x), -1)
     for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = _corners(triangles[t])
         first_i, last_i = _within(x, min(a[0], b[0], c[0]), max(a[0], b[0], c[0]))
         first_j, last_j = _within(y, min(a[1], b[1], c[1]), max(a[1], b[1], c[1]))
         for j in range(first_j, last_j):
@@ -56,9 +56,15 @@ def heights_of(triangles: np.ndarray, numbers: np.ndarray, x: np.ndarray, y: np.
     heights = np.full(len(numbers), NO_CONTACT_MM)
     for n in range(len(numbers)):
         if numbers[n] >= 0:
-            a, b, c = triangles[numbers[n], 0], triangles[numbers[n], 1], triangles[numbers[n], 2]
+            a, b, c = _corners(triangles[numbers[n]])
             heights[n] = _plane(a, b, c, x[n], y[n])[1]
     return heights
+
+
+@compiled(inline="always")
+def _corners(t):
+    """A triangle's corners as numbers, which a loop over points keeps in registers."""
+    return (t[0, 0], t[0, 1], t[0, 2]), (t[1, 0], t[1, 1], t[1, 2]), (t[2, 0], t[2, 1], t[2, 2])
 
 
 @compiled(inline="always")

@@ -40,13 +40,14 @@ class Underside:
 
     def depth_on_springs(self, force_n: float, foundation_modulus: float) -> float:
         """First guess of the depth (mm) below first touch under a force: on a Winkler foundation of `foundation_modulus` N/mm3,
-        with the heights sampled around the nodes; infinite for an object that stands between all of them.
+        with the heights sampled around the nodes, and deep enough to touch a node; infinite for an object that stands between all.
         """
         there = self._coarse < NO_CONTACT_MM
         if not there.any():
             return np.inf
         area = np.broadcast_to(np.outer(_TRAPEZOID, _TRAPEZOID).ravel() * np.prod(self._grid.step), there.shape)[there]
-        return depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / foundation_modulus)
+        depth = depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / foundation_modulus)
+        return max(depth, float(self._height.min()) - self.lowest_mm)
 
     def points(self, reach_mm: float) -> ObjectPoints:
         """The `ObjectPoints` where the object is less than `reach_mm` above its lowest point."""

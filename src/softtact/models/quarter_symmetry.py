@@ -256,11 +256,11 @@ class ParityBlocks:
         Computed parity by parity, without the rectangle's matrix, which is four times as large as the quarter's blocks.
         """
         signs = np.where(column_signs < 0, -1.0, 1.0)
-        (ny, nx), places = shape, self.blocks.shape[2]
-        of_parity = np.zeros((len(PARITIES), places, loads.shape[1]), dtype=self.blocks.dtype)
+        (ny, nx), first, last = shape, columns.min(initial=self.blocks.shape[2] - 1), columns.max(initial=0) + 1
+        of_parity = np.zeros((len(PARITIES), max(last - first, 0), loads.shape[1]), dtype=self.blocks.dtype)
         for total, (p, q) in zip(of_parity, PARITIES, strict=True):
-            np.add.at(total, columns, signs[:, :1]**p * signs[:, 1:]**q * loads)
-        rows = self.blocks[:, :ny * nx].reshape(len(PARITIES), ny, nx, places)[:, ::every, ::every]
+            np.add.at(total, columns - first, signs[:, :1]**p * signs[:, 1:]**q * loads)
+        rows = self.blocks[:, :ny * nx, first:last].reshape(len(PARITIES), ny, nx, -1)[:, ::every, ::every]
         ee, eo, oe, oo = 0.25 * (rows @ of_parity[:, None])
         even, odd = (np.concatenate([(a - b)[:, :0:-1], a + b], axis=1) for a, b in ((ee, oe), (eo, oo)))
         return np.moveaxis(np.concatenate([(even - odd)[:0:-1], even + odd]), -1, 0)
@@ -268,15 +268,30 @@ class ParityBlocks:
 
 @compiled
 def _between(blocks, rows, row_negative, columns, column_negative):
-    out = np.empty((len(rows), len(columns)), dtype=blocks.dtype)
-    for a in range(len(rows)):
-        i, ax, ay = rows[a], row_negative[a, 0], row_negative[a, 1]
-        ee, eo, oe, oo = blocks[0, i], blocks[1, i], blocks[2, i], blocks[3, i]
+    out, before, first, last = np.empty((len(rows), len(columns)), dtype=blocks.dtype), -1, blocks.shape[2], 0
+    for b in range(len(columns)):
+        first, last = min(first, columns[b]), max(last, columns[b] + 1)
+    count = max(last - first, 0)
+    images, place = np.empty(4 * count, dtype=blocks.dtype), np.empty((4, len(columns)), dtype=np.uint32)
+    for own in range(4):
         for b in range(len(columns)):
-            j, x, y = columns[b], ax != column_negative[b, 0], ay != column_negative[b, 1]
-            total = ee[j]
-            total += -eo[j] if y else eo[j]
-            total += -oe[j] if x else oe[j]
-            total += -oo[j] if x != y else oo[j]
-            out[a, b] = total * 0.25
+            place[own, b] = (own ^ (2 * column_negative[b, 0] + column_negative[b, 1])) * count + columns[b] - first
+    for a in np.argsort(rows):     # a place and its mirror images share what is read of the blocks
+        if rows[a] != before:
+            before = rows[a]
+            _sum_up(images, blocks[:, before, first:last])
+        own = 2 * row_negative[a, 0] + row_negative[a, 1]
+        for b in range(len(columns)):
+            out[a, b] = images[place[own, b]]
     return out
+
+
+@compiled(inline="always")
+def _sum_up(images, of_parity):
+    """The compliance (4 m,) at places and their images along y, along x and both, from that of each parity (4, m)."""
+    count, quarter = of_parity.shape[1], of_parity.dtype.type(0.25)
+    for j in range(count):
+        even, odd = of_parity[0, j] + of_parity[1, j], of_parity[0, j] - of_parity[1, j]
+        along_x, both = of_parity[2, j], of_parity[3, j]
+        images[j], images[count + j] = (even + along_x + both) * quarter, (odd + along_x - both) * quarter
+        images[2 * count + j], images[3 * count + j] = (even - along_x - both) * quarter, (odd - along_x + both) * quarter

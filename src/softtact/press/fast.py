@@ -145,8 +145,8 @@ def _elastic_contact(sensor, surface, forces, touch, *, patches=False):
         return (press_layer(compliance, points, on_pad, patches=patches) if on_pad.any()
                 else rest_on_shell(compliance, points, len(forces), stop))
 
-    return _of_candidates(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
-                         lambda press: press.contact.depth[-1])
+    first = RISE * underside.depth_on_springs(forces[-1], compliance.foundation_modulus)
+    return _of_candidates(underside, underside.nodes, first, sensor.spec.deepest_mm, solve, lambda press: press.contact.depth[-1])
 
 
 def _above_shell(press, stop_mm):
@@ -216,8 +216,8 @@ def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, c
         control.reached.follow(map(record, _steps_on_pad(compliance, points, forces, stop, touch)), len(forces),
                                partial(so_far, points), label=control.label, start=start)
 
-    points, _ = _of_candidates(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
-                               lambda _: load_steps[-1].depth)
+    reach = REACH * underside.depth_on_springs(forces[-1], compliance.foundation_modulus) + LEAST_REACH_MM
+    points, _ = _of_candidates(underside, underside.points, reach, sensor.spec.thickness_mm, solve, lambda _: load_steps[-1].depth)
     return so_far(points)
 
 
@@ -267,12 +267,11 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
                        **numbers)
 
 
-def _of_candidates(underside, points_within, foundation_modulus, forces, deepest, solve, depth_of):
-    """Candidate contact points within the expected depth, and the result of `solve` for them; repeated with more points if deeper.
+def _of_candidates(underside, points_within, reach, deepest, solve, depth_of):
+    """Candidate contact points within a first reach (mm), and the result of `solve` for them; repeated with more points if deeper.
 
     Beside the object the surface rises, so points slightly above the object's depth can touch, too.
     """
-    reach = REACH * underside.depth_on_springs(forces[-1], foundation_modulus) + LEAST_REACH_MM
     while True:
         reach = min(reach, deepest)
         points = points_within(reach)

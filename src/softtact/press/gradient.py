@@ -170,7 +170,7 @@ def _pressed_layer(result, compliance, surface):
 
 
 def _reach(result, underside, compliance, deepest_mm):
-    """Height over first touch up to which the press had points, as in `press.fast`."""
+    """Height over first touch up to which points are taken: at least as many as the press had (`press.fast`)."""
     reach = REACH * underside.depth_on_springs(result.normal_force_n[-1], compliance.foundation_modulus) + LEAST_REACH_MM
     while reach < deepest_mm and RISE * result.indentation_mm[-1] > reach:
         reach *= REACH

@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from array_api_compat import array_namespace, device
 
-from softtact.compiled import compiled
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.node_grid import apply_stencil
 from softtact.contact.undersides import PosedUnderside
-from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps
+from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps, depth_on_springs
 from softtact.models.elastic.compliance import Compliance, LayerPress
 from softtact.models.quarter_symmetry import PARITIES
 
@@ -32,7 +31,6 @@ _SIDES = 5              # lengths of a rectangle's sides, so that few are prepar
 _NEAR = 1.8             # times the depth on springs, which are stiffer at a contact's edges than the layer
 _SUMMED = 128          # products that are summed up in single precision
 _ROUNDING = 1e-6       # of a force: what single precision leaves of it
-_NEWTONS = 30           # steps to the depth on springs, a first guess
 _TINY = 1e-30           # in place of a zero that divides
 
 
@@ -175,7 +173,8 @@ def press_layers(compliance: Compliance, objects: list[PosedUnderside], forces_n
 def _press_columns(compliance, heights, forces_n, stops, device, settings):
     """The `LayerPress` of columns (m,) with heights (m, n): first among the nodes that the objects are expected to come near."""
     grid, area = compliance.grid, compliance.grid.areas(np.arange(compliance.grid.count))
-    first = _depths_on_springs(heights, area, forces_n / compliance.foundation_modulus)
+    first = np.array([depth_on_springs(one, area, force / compliance.foundation_modulus)
+                      for one, force in zip(heights, forces_n, strict=True)])
     found: dict[str, np.ndarray] = {}
 
     def press(some, quarter):
@@ -324,23 +323,3 @@ class _Columns:
             direction *= xp.where(rho > 0, turned / xp.clip(rho, min=_TINY), 0.0)
             direction += z
             rho = xp.sum(residual * z, axis=0)
-
-
-@compiled
-def _depths_on_springs(heights, area, force_over_modulus):
-    """Depths (m,) in mm at which independent springs under heights (m, n) carry forces: Newton's method from one side."""
-    depths = np.empty(len(heights))
-    for m in range(len(heights)):
-        depth = heights[m].min()
-        for _ in range(_NEWTONS):
-            carried, carrying = 0.0, 0.0
-            for n in range(len(area)):
-                if heights[m, n] <= depth:
-                    carried += area[n] * (depth - heights[m, n])
-                    carrying += area[n]
-            step = (force_over_modulus[m] - carried) / carrying
-            depth += step
-            if abs(step) < 1e-3:
-                break
-        depths[m] = depth
-    return depths

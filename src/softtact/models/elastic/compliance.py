@@ -257,14 +257,17 @@ def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence
     0.1 %
     """
     areas, stencil = compliance.grid.areas(points.nodes), compliance.stencil.on(compliance.grid, points.nodes)
-    share, among = patches_of(points, compliance.grid, patches, beside_edge=_SINGLE), compliance.among(points)
-    own, single = (share > 0).astype(np.float32), share.astype(np.float32)
-    if share.shape[0] < points.count:
-        among = single @ np.ascontiguousarray((single @ among).T)
-    contact = press_elastic(among, share @ points.gap, forces_n, area=own @ (points.covered * areas),
-                            foundation_modulus=compliance.foundation_modulus,
-                            precondition=lambda x: own @ stencil(own.T @ x))
-    contact = replace(contact, force=share.T @ contact.force, gap=own.T @ contact.gap)
+    share = patches_of(points, compliance.grid, True, beside_edge=_SINGLE) if patches else None
+    if share is None or share.shape[0] == points.count:
+        contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * areas,
+                                foundation_modulus=compliance.foundation_modulus, precondition=stencil)
+    else:
+        own, single = (share > 0).astype(np.float32), share.astype(np.float32)
+        among = single @ np.ascontiguousarray((single @ compliance.among(points)).T)
+        contact = press_elastic(among, share @ points.gap, forces_n, area=own @ (points.covered * areas),
+                                foundation_modulus=compliance.foundation_modulus,
+                                precondition=lambda x: own @ stencil(own.T @ x))
+        contact = replace(contact, force=share.T @ contact.force, gap=own.T @ contact.gap)
     return LayerPress(fields=compliance.fields(points, contact.force), contact=contact, areas=areas,
                       lower_fields=compliance.lower_fields(points, contact.force))
 
