@@ -15,7 +15,13 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def test_each_file_that_states_the_version_states_that_of_the_package():
     citation, recipe = (yaml.safe_load((ROOT / name).read_text()) for name in ("CITATION.cff", "recipe/recipe.yaml"))
-    assert citation["version"] == recipe["package"]["version"] == softtact.__version__
+    assert citation["version"] == recipe["context"]["version"] == softtact.__version__
+
+
+def test_the_recipe_states_each_name_that_its_texts_use():
+    text = (ROOT / "recipe/recipe.yaml").read_text()
+    used = set(re.findall(r"\$\{\{ (\w+) \}\}", text))
+    assert "version" in used and used <= set(yaml.safe_load(text)["context"])
 
 
 def test_the_recipe_needs_what_the_core_needs():
@@ -31,7 +37,7 @@ def test_a_release_writes_its_version_and_day_into_every_file():
     texts = {path.name: text for path, text in release.prepared_files("98.7.6", "2031-02-03").items()}
     assert '__version__ = "98.7.6"\n' in texts["__init__.py"]
     assert "\nversion: 98.7.6\ndate-released: 2031-02-03\n" in texts["CITATION.cff"]
-    assert yaml.safe_load(texts["recipe.yaml"])["package"]["version"] == "98.7.6"
+    assert yaml.safe_load(texts["recipe.yaml"])["context"]["version"] == "98.7.6"
     assert "## Unreleased\n\n## 98.7.6 (2031-02-03)\n" in texts["CHANGELOG.md"]
 
 
@@ -53,3 +59,17 @@ def test_the_paper_cites_what_its_bibliography_holds_and_each_entry_says_where_i
     entries = dict(re.findall(r"^@[a-z]+\{([a-z]+),\n(.*?)^\}", (ROOT / "paper/paper.bib").read_text(), re.MULTILINE | re.DOTALL))
     assert cited == set(entries)
     assert all(re.search(r"^  doi +=|howpublished", entry, re.MULTILINE) for entry in entries.values())
+    assert all(re.search(rf"^  {field} +=", entry, re.MULTILINE) for entry in entries.values()
+               for field in ("title", "author", "year"))
+
+
+def test_the_paper_has_the_head_and_the_sections_of_its_journal():
+    _, head, text = (ROOT / "paper/paper.md").read_text().split("---\n", 2)
+    stated, citation = yaml.safe_load(head), yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert {"title", "tags", "authors", "affiliations", "date", "bibliography"} <= set(stated) and len(stated["tags"]) >= 3
+    assert [one["name"] for one in stated["authors"]] == [one["name"] for one in citation["authors"]]
+    assert {one["affiliation"] for one in stated["authors"]} == {one["index"] for one in stated["affiliations"]}
+    assert (ROOT / "paper" / stated["bibliography"]).is_file()
+    sections = re.findall(r"^# (.*)$", text, re.MULTILINE)
+    assert {"Summary", "Statement of need", "State of the field", "Software design"} <= set(sections)
+    assert sections[-1] == "References"
