@@ -8,7 +8,15 @@ from softtact.fem.elements import HEX27
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import surface_grid
-from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, element_stiffness
+from softtact.models.quarter_symmetry import (
+    PARITIES,
+    LinearLayer,
+    ParityBlocks,
+    ParityProduct,
+    QuarterSlab,
+    SignedPlaces,
+    element_stiffness,
+)
 
 SOFT = LinearLayer(1.0, bulk_modulus=4.0, shear_modulus=0.3)
 STIFF = LinearLayer(1.5, bulk_modulus=0.8, shear_modulus=0.5, shares=(0.6, 0.4))
@@ -88,6 +96,18 @@ def test_the_compliance_is_symmetric_and_positive():
     whole = blocks.between(*places, *places)
     assert np.linalg.eigvalsh(whole).min() > 0
     np.testing.assert_allclose(whole, whole[::-1, ::-1], atol=ROUND_OFF * whole.max())      # turned by half a turn
+
+
+def test_products_by_parity_are_those_with_the_matrix_between_the_places():
+    rng = np.random.default_rng(4)
+    blocks = ParityBlocks(rng.normal(size=(4, 7, 9)))
+    rows, columns = (SignedPlaces(rng.integers(0, count, many), rng.choice([-1, 1], (many, 2)), rng.uniform(-2, 2, many))
+                     for count, many in ((7, 20), (9, 30)))
+    matrix = blocks.between(rows.numbers, rows.signs, columns.numbers, columns.signs) * np.outer(rows.factors, columns.factors)
+    product, loads, forces = ParityProduct(blocks, rows, columns), rng.normal(size=(30, 3)), rng.normal(size=(3, 20))
+    for got, expected in ((product @ loads, matrix @ loads), (product @ loads[:, 0], matrix @ loads[:, 0]),
+                          (forces @ product, forces @ matrix), (forces[0] @ product, forces[0] @ matrix)):
+        np.testing.assert_allclose(got, expected, atol=1e-12)
 
 
 # --- mechanics ---

@@ -11,6 +11,7 @@ rubber.
 Reference: representation of the dihedral group; Healey and Treacy, Int. J. Numer. Meth. Engng 31 (1991) 265.
 """
 
+import copy
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -264,6 +265,59 @@ class ParityBlocks:
         ee, eo, oe, oo = 0.25 * (rows @ of_parity[:, None])
         even, odd = (np.concatenate([(a - b)[:, :0:-1], a + b], axis=1) for a, b in ((ee, oe), (eo, oo)))
         return np.moveaxis(np.concatenate([(even - odd)[:0:-1], even + odd]), -1, 0)
+
+
+class ParityProduct:
+    """The compliance G (r, c) between places as a factor, G @ loads and forces @ G, without the matrix.
+
+    Places that differ by their signs alone share a row or column of the blocks, so a product reads a quarter of G's entries where
+    the places lie on all sides of the middle, and as many in all other cases.
+    """
+
+    __array_ufunc__ = None     # so that `forces @ G` comes here
+
+    def __init__(self, blocks: ParityBlocks, rows: "SignedPlaces", columns: "SignedPlaces") -> None:
+        (used_rows, self._rows), (used_columns, self._columns) = (one.folding(blocks.blocks.dtype) for one in (rows, columns))
+        self._of_rows, self._of_columns = self._rows.T.tocsr(), self._columns.T.tocsr()
+        self._blocks = np.stack([block[used_rows[:, None], used_columns] for block in blocks.blocks])     # as BLAS asks for
+
+    def __matmul__(self, loads: np.ndarray) -> np.ndarray:
+        """Displacements (r,) or (r, l) under loads (c,) or (c, l)."""
+        return self._of_rows @ _by_parity(self._blocks, self._columns @ loads)
+
+    def __rmatmul__(self, forces: np.ndarray) -> np.ndarray:
+        """Displacements (c,) or (l, c) under the conjugate forces (r,) or (l, r)."""
+        return (self._of_columns @ _by_parity(self._blocks.transpose(0, 2, 1), self._rows @ forces.T)).T
+
+    def astype(self, dtype: type) -> "ParityProduct":
+        """The same with blocks of another precision."""
+        other = copy.copy(self)
+        other._blocks = self._blocks.astype(dtype)
+        return other
+
+
+@dataclass(frozen=True)
+class SignedPlaces:
+    """Places on the rectangle: numbers (n,) in the quarter, signs (n, 2) of x and y, and factors (n,) of what is measured there."""
+
+    numbers: np.ndarray
+    signs: np.ndarray
+    factors: np.ndarray | float = 1.0
+
+    def folding(self, dtype: np.dtype) -> tuple[np.ndarray, sp.csr_matrix]:
+        """The numbers (u,) that occur, and the matrix (4 u, n) from loads at the places to those of these numbers by parity."""
+        used, place = np.unique(self.numbers, return_inverse=True)
+        signs, numbers = np.where(self.signs < 0, -1.0, 1.0), np.arange(len(place))
+        weights = [0.5 * self.factors * signs[:, 0]**p * signs[:, 1]**q for p, q in PARITIES]     # the other side has a half, too
+        rows = [number * len(used) + place for number in range(len(PARITIES))]
+        return used, sp.csr_matrix((np.concatenate(weights).astype(dtype), (np.concatenate(rows), np.tile(numbers, len(PARITIES)))),
+                                   shape=(len(PARITIES) * len(used), len(place)))
+
+
+def _by_parity(blocks, folded):
+    """Products (4 r,) or (4 r, l) of blocks (4, r, u) with loads (4 u,) or (4 u, l)."""
+    columns = folded.reshape(len(blocks), blocks.shape[2], *folded.shape[1:])
+    return np.concatenate([block @ column for block, column in zip(blocks, columns, strict=True)])
 
 
 @compiled

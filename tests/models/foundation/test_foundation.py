@@ -11,7 +11,7 @@ from support.laws import LAWS
 
 from softtact.contact.node_grid import NodeGrid, pressure_weights
 from softtact.errors import ConvergenceError, InputError
-from softtact.models.foundation import solve
+from softtact.models.foundation import active_system
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges, lattice_places
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, membrane_loads, press_foundation
@@ -198,22 +198,22 @@ def test_a_force_that_is_not_reached_says_from_which_one_on(compliance):
 
 
 @pytest.mark.parametrize("values", [(0, 0, 0, 0, 0, 0), TILTED])
-def test_steps_that_keep_their_load_steps_factor_give_the_map_of_steps_with_their_own(compliance, monkeypatch, values):
+def test_a_press_whose_steps_share_factors_gives_the_map_of_steps_with_their_own(compliance, monkeypatch, values):
     made, points = [], points_of(BOX, compliance, values)
 
-    class Counted(solve._Factored):
+    class Counted(active_system._Factor):
         def __init__(self, *what):
             made.append(self)
             super().__init__(*what)
 
-    monkeypatch.setattr(solve, "_Factored", Counted)
+    monkeypatch.setattr(active_system, "_Factor", Counted)
     load_steps, counts = [], []
-    for share in (0.0, FoundationSettings().same_slope):
+    for border in (-1.0, active_system._BORDER):
         made.clear()
-        settings = FoundationSettings(same_slope=share)
-        load_steps.append(list(press_foundation(compliance, points, [0.3, 0.6, 0.9], settings=settings)))
+        monkeypatch.setattr(active_system, "_BORDER", border)
+        load_steps.append(list(press_foundation(compliance, points, [0.3, 0.6, 0.9])))
         counts.append(len(made))
-    assert counts[1] < counts[0]
+    assert counts[1] < counts[0] / 2
     own, kept = (FoundationMaps(compliance, points)(each) for each in load_steps)
     assert_close(kept, own, 1e-3)      # the tolerance's 0.03 % in the root mean square
 

@@ -19,6 +19,7 @@ import scipy.sparse as sp
 
 from softtact.contact.object_points import ObjectPoints
 from softtact.models.foundation.compliance import FoundationCompliance
+from softtact.models.quarter_symmetry import ParityProduct, SignedPlaces
 
 _AROUND, _DEEP = 6, 6     # nodes along an edge, and in contact behind it, for the computation of a node's compliance
 _ROUNDED = 0.12           # of the depth: height on a rounded edge up to which the rounding is ignored
@@ -37,6 +38,15 @@ class Places:
         self.columns = np.concatenate([nodes, quarter + self.frusta])
         self.signs = np.vstack([signs, self.frustum_signs])
         self._map_start = quarter + len(self.frusta) // 4
+        self._loaded = SignedPlaces(self.columns, self.signs)
+        x, y = self.frustum_signs.T
+        self._roots = self._of_frusta(x, x, y, y)
+
+    def _of_frusta(self, *factors):
+        """Places of quantities of all frusta, one after the other, each with its factors (b,)."""
+        kinds, quarter = len(factors), len(self.frusta) // 4
+        return SignedPlaces(np.concatenate([kind * quarter + self.frusta for kind in range(kinds)]),
+                                       np.tile(self.frustum_signs, (kinds, 1)), np.concatenate(factors))
 
     def surface(self) -> np.ndarray:
         """Compliance (n + b, n + b) of nodes and frusta."""
@@ -46,48 +56,30 @@ class Places:
         """Deformation maps (l, ny, nx) in mm, fixed sides included, under loads (n + b, l) and lateral loads of frusta (4 b, l)."""
         coarse = self.compliance.grid.every_second
         numbers, signs = coarse.quarter(np.arange(coarse.count))
-        rows = self.compliance.surface.between(self._map_start + numbers, signs, self.columns, self.signs)
-        by_frusta = self._lateral(self._map_start + numbers, signs).T @ lateral.astype(np.float32)
-        down = rows @ load.astype(np.float32) + by_frusta
+        at = SignedPlaces(self._map_start + numbers, signs)
+        by_frusta = lateral.T.astype(np.float32) @ ParityProduct(self.compliance.lateral, self._roots, at)
+        down = ParityProduct(self.compliance.surface, at, self._loaded) @ load.astype(np.float32) + by_frusta.T
         return coarse.with_held_sides(down.T.reshape(-1, *coarse.shape).astype(float))
 
-    def sideways(self, nodes: np.ndarray) -> np.ndarray:
+    def sideways(self, nodes: np.ndarray) -> ParityProduct:
         """Lateral displacements (2 k, n + b) in x and y of nodes (k,) of the grid of every second node."""
         numbers, signs = self.compliance.grid.every_second.quarter(nodes)
-        block = self.compliance.sideways
-        quarter = block.blocks.shape[1] // 2
-        return np.vstack([block.between(axis * quarter + numbers, signs, self.columns, self.signs)
-                          * signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
+        quarter = self.compliance.sideways.blocks.shape[1] // 2
+        rows = SignedPlaces(np.concatenate([numbers, quarter + numbers]), np.tile(signs, (2, 1)), signs.T.ravel())
+        return ParityProduct(self.compliance.sideways, rows, self._loaded)
 
-    def lateral(self) -> np.ndarray:
+    def lateral(self) -> ParityProduct:
         """Displacement and tilt along x, then along y (4 b, n + b), of all frusta's roots."""
-        return self._lateral(self.columns, self.signs)
+        return ParityProduct(self.compliance.lateral, self._roots, self._loaded)
 
-    def _lateral(self, columns, signs):
-        """`lateral` from unit downward forces at places with numbers (k,) in the quarter and signs (k, 2)."""
-        return np.vstack([self.compliance.lateral.between(rows, self.frustum_signs, columns, signs) * sign[:, None]
-                          for rows, sign in self._lateral_rows()])
-
-    def lateral_self(self) -> np.ndarray:
+    def lateral_self(self) -> ParityProduct:
         """`lateral` (4 b, 4 b) from unit forces and moments on the frusta along x, then along y."""
-        block, kinds = self.compliance.lateral_self, list(self._lateral_rows())
-        return np.block([[block.between(rows, self.frustum_signs, columns, self.frustum_signs) * np.outer(sign, other)
-                          for columns, other in kinds] for rows, sign in kinds])
+        return ParityProduct(self.compliance.lateral_self, self._roots, self._roots)
 
-    def _lateral_rows(self):
-        """Rows (b,) of all frusta's displacements and tilts along x, then along y, among the quarter's; and signs (b,)."""
-        quarter = self.compliance.lateral.blocks.shape[1] // 4
-        for kind in range(4):
-            yield kind * quarter + self.frusta, self.frustum_signs[:, kind // 2].astype(np.float32)
-
-    def membrane(self) -> np.ndarray:
+    def membrane(self) -> ParityProduct:
         """Membrane forces (3 b, n + b) of all cells."""
-        block = self.compliance.membrane
-        quarter = block.blocks.shape[1] // 3
-        rows = [block.between(k * quarter + self.frusta, self.frustum_signs, self.columns, self.signs) for k in range(3)]
-        rows[2] *= self.frustum_signs.prod(axis=1).astype(np.float32)[:, None]
-        return np.vstack(rows)
-
+        even, both = np.ones(len(self.frusta)), self.frustum_signs.prod(axis=1)
+        return ParityProduct(self.compliance.membrane, self._of_frusta(even, even, both), self._loaded)
 
 def lattice_places(counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (b,) in the quarter, counted from the middle, and signs (b, 2) of all frusta, x fastest."""

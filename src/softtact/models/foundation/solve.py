@@ -39,11 +39,13 @@ import scipy.linalg as sla
 from softtact.contact.node_grid import patches_of
 from softtact.contact.object_points import ObjectPoints
 from softtact.errors import ConvergenceError
+from softtact.models.foundation.active_system import ActiveSystem
 from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges
 
 _STEP = 0.01         # of a force, for a difference quotient
 _SLOWLY = 5.0        # factor of stricter convergence where updates are relaxed by half
+_WITHIN = 0.005      # of the tolerance: error of the forces that a step's linear system is solved to
 _REPEATS = 6         # updates of the covered shares after convergence of the forces; the last one relaxed by half
 _STRAYED = 0.03      # of a grid step, and of the depth: movements of points and object that require an update of covered shares
 _PATIENCE = 8        # iterations after which updates of oscillating loads are relaxed by half
@@ -62,7 +64,6 @@ class FoundationSettings:
     tolerance: largest change of a frustum's force in the last step over the total force;  gap_mm: overlap that activates a point
     follow: whether the effects of finite displacements are included;  rocking: whether frusta rock
     patches: whether four points share a patch
-    same_slope: relative change of the frusta's compliances up to which a factorisation is reused, if no contact changed
     """
 
     tolerance: float = 5e-5     # a hundredth of it changes the map by at most 0.03 % (root mean square)
@@ -71,7 +72,6 @@ class FoundationSettings:
     follow: bool = True
     rocking: bool = True
     patches: bool = True
-    same_slope: float = 0.05     # a step reduces the error to this share, so a load step's second step needs no factorisation
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,9 @@ class FiniteDisplacement:
         """Compliance (2, 2) of the central frustum's displacement and tilt along x to force and moment on it."""
         middle = np.ravel_multi_index([count // 2 for count in self.lattice], self.lattice)
         both = middle + self.frusta * np.arange(2)
-        return self.lateral_self[np.ix_(both, both)].astype(float)
+        units = np.zeros((4 * self.frusta, 2))
+        units[both, [0, 1]] = 1.0
+        return (self.lateral_self @ units)[both].astype(float)
 
 
 def membrane_loads(down: np.ndarray, forces: np.ndarray) -> np.ndarray:
@@ -197,8 +199,11 @@ def membrane_loads(down: np.ndarray, forces: np.ndarray) -> np.ndarray:
 
 def _centred(values, axis):
     """Half the difference of the neighbours along an axis, zero beyond the borders; minus its transpose."""
-    padded = np.moveaxis(np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(2)]), axis, 0)
-    return np.moveaxis(0.5 * (padded[2:] - padded[:-2]), 0, axis)
+    out, along = np.zeros_like(values), np.moveaxis(values, axis, 0)
+    difference = np.moveaxis(out, axis, 0)
+    difference[:-1] = 0.5 * along[1:]
+    difference[1:] -= 0.5 * along[:-1]
+    return out
 
 
 @dataclass(frozen=True)
@@ -304,13 +309,14 @@ class FoundationMaps:
 class _State:
     """Active sets of patches and frusta, the forces q (b,) of the frusta's law in N, and the effects of finite displacements.
 
-    depth: of the object below its first touch in mm
+    solved (c + b,): forces of patches and frusta in N as last solved for;  depth: of the object below its first touch in mm
     """
 
     touching: np.ndarray
     standing: np.ndarray
     q: np.ndarray
     effects: Effects
+    solved: np.ndarray
     depth: float
 
 
@@ -322,7 +328,7 @@ def _continued(path, force):
     first, before = path[-2]
     share = (force - second) / (second - first)
     return replace(now, q=np.maximum(now.q + share * (now.q - before.q), 0.0), depth=now.depth + share * (now.depth - before.depth),
-                   effects=now.effects.continued(before.effects, share))
+                   solved=now.solved + share * (now.solved - before.solved), effects=now.effects.continued(before.effects, share))
 
 
 class _Press:
@@ -333,14 +339,14 @@ class _Press:
         self.frusta = len(places.frusta)
         self.patch = patches_of(points, compliance.grid, settings.patches)
         self.slab, self.edges = _Slab(places.surface(), self.patch), SoftEdges(compliance)
-        self.possible, self._factored = np.ones(self.patch.shape[0], dtype=bool), None
+        self.possible, self.system = np.ones(self.patch.shape[0], dtype=bool), ActiveSystem(self.slab.matrix, self.patch.shape[0])
         self.finite = FiniteDisplacement(compliance, points, places, settings)
 
     def first(self):
         """The start of a press: the lowest patches touch."""
         gap = self.patch @ self.points.gap
         return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), np.zeros(self.frusta),
-                      self.finite.none(), 0.0)
+                      self.finite.none(), np.zeros(len(self.slab.matrix)), 0.0)
 
     def load_step(self, state, force, *, rough=False):
         """Newton's method from a state, which is updated to the load step; returns it, or None on failure, and the iterations.
@@ -359,14 +365,14 @@ class _Press:
                 break
             effects, already = state.effects, self.slab.seen(self.finite.down(state.effects))
             try:
-                f, q, depth = self._solve(gap0, already, state, force)
+                displacement, depth = self._solve(gap0, already, state, force, _WITHIN * enough)
             except sla.LinAlgError:
                 break
             if not abs(depth) < _ABSURD_MM:
                 break
-            forces = np.concatenate([f, q + effects.loads])
-            displacement = (self.slab.matrix @ forces.astype(np.float32)).astype(float) + already
-            gap, down, load = gap0 - depth + displacement[:c], -displacement[c:], self.slab.load(forces)
+            f, q = state.solved[:c], state.solved[c:]
+            gap, down = gap0 - depth + displacement[:c] + self.slab.contact_compliance * f, -displacement[c:]
+            load = self.slab.load(np.concatenate([f, q + effects.loads]))
             change, state.depth = self._take(state, q), depth - self.points.gap.min()
             share = 1.0 if iteration <= _PATIENCE else 0.5
             state.effects, missing = self.finite.renewed(effects, load, down, state.q, share=share)
@@ -390,8 +396,7 @@ class _Press:
         contact_compliance = self.patch.power(2) @ np.minimum(self.edges(points, moved, depth), _FREE)
         self.possible = contact_compliance < _SOFTEST
         state.touching = state.touching & self.possible
-        self.slab.soften(contact_compliance)
-        self._factored = None
+        self.slab.contact_compliance = contact_compliance
         return self.patch @ (points.gap + (points.slope.T * moved).sum(axis=0))
 
     def _elsewhere(self, state, moved, depth):
@@ -399,22 +404,20 @@ class _Press:
         steps = np.abs(state.effects.moved - moved).max() / self.points.step.min()
         return steps > _STRAYED or abs(state.depth - depth) > _STRAYED * abs(state.depth)
 
-    def _solve(self, gap0, already, state, force):
-        """Forces of patches (c,) and frusta (b,), and the depth, for the current active sets with the law's tangent.
+    def _solve(self, gap0, already, state, force, enough):
+        """Displacements (c + b,) of patches downwards and frusta upwards, and the depth, for the current active sets with the law's
+        tangent; sets `state.solved`.
 
-        already (c + b,): displacements of patches downwards and frusta upwards from other causes
+        already (c + b,): displacements from other causes than patches and frusta;  enough: error of the forces in N
         """
-        c, law, matrix, slope = len(gap0), self.law, self.slab.matrix, self.law.slope(state.q)
-        if self._factored is None or not self._factored.serves(state, slope, self.settings.same_slope):
-            self._factored = _Factored(matrix, state, slope)
-        factored, a, b = self._factored, np.flatnonzero(state.touching), np.flatnonzero(state.standing)
-        moved = (matrix[:, c:] @ state.effects.loads.astype(np.float32) + already)[factored.rows]
-        reached = factored.slope[b] * state.q[b] - law.extension(state.q[b]) + state.effects.rise[b]
-        at_rest = factored.solve(np.concatenate([-gap0[a], reached]) - moved)
-        depth = (force - at_rest[:len(a)].sum()) / factored.per_depth[:len(a)].sum()
-        forces = np.zeros(len(matrix))
-        forces[factored.rows] = at_rest + depth * factored.per_depth
-        return forces[:c], forces[c:], depth
+        c, law, slab, slope = len(gap0), self.law, self.slab, self.law.slope(state.q)
+        rows = np.flatnonzero(np.concatenate([state.touching, state.standing]))
+        spring = np.concatenate([slab.contact_compliance, slope])
+        already = already + slab.matrix[:, c:] @ state.effects.loads.astype(np.float32)
+        reached = slope * state.q - law.extension(state.q) + state.effects.rise
+        right = np.concatenate([-gap0, reached]) - already
+        state.solved, moved, depth = self.system.solve(rows, spring, right, state.solved, force, enough)
+        return moved + already, depth
 
     @staticmethod
     def _take(state, q):
@@ -435,7 +438,10 @@ class _Press:
 
 
 class _Slab:
-    """The compliance among patches, downwards, and frusta, upwards: matrix (c + b, c + b) in mm/N."""
+    """The compliance among patches, downwards, and frusta, upwards: matrix (c + b, c + b) in mm/N.
+
+    contact_compliance (c,): of a spring in series with each patch, in mm/N
+    """
 
     def __init__(self, compliance, patch):
         """compliance (n + b, n + b) of n nodes and of frusta, downwards;  patch (c, n): shares of nodes in patches"""
@@ -446,18 +452,7 @@ class _Slab:
         self.matrix[:c, c:] = -(at @ np.ascontiguousarray(compliance[:n, n:]))
         self.matrix[c:, :c] = self.matrix[:c, c:].T
         self.matrix[c:, c:] = compliance[n:, n:]
-        self._hard = np.diag(self.matrix)[:c].copy()
-
-    @property
-    def contact_compliance(self):
-        """The springs (c,) that `soften` added, in mm/N."""
-        c = len(self._hard)
-        return self.matrix[range(c), range(c)].astype(float) - self._hard
-
-    def soften(self, contact_compliance):
-        """Add a spring of compliance (c,) in mm/N in series with each patch."""
-        place = np.arange(len(contact_compliance))
-        self.matrix[place, place] = self._hard + contact_compliance
+        self.contact_compliance = np.zeros(c)
 
     def seen(self, down):
         """Displacements (c + b,) of patches downwards and frusta upwards from descents (n + b,) of nodes and frusta."""
@@ -468,30 +463,3 @@ class _Slab:
         """Downward forces (n + b,) on nodes and frusta from forces (c + b,) on patches downwards and on frusta upwards."""
         patches = self._patch.shape[0]
         return np.concatenate([self._patch.T @ forces[:patches], -forces[patches:]])
-
-
-class _Factored:
-    """The matrix of some active sets and slopes (b,), factored in single precision.
-
-    rows: those of the touching patches, then of the standing frusta;  per_depth: their forces in N for each mm of depth
-    """
-
-    def __init__(self, matrix, state, slope):
-        self._touching, self._standing, self.slope = state.touching.copy(), state.standing.copy(), slope
-        a, b = np.flatnonzero(state.touching), np.flatnonzero(state.standing)
-        self.rows, frusta = np.concatenate([a, len(state.touching) + b]), np.arange(len(a), len(a) + len(b))
-        self._system = matrix.take(self.rows, axis=0).take(self.rows, axis=1)
-        self._system[frusta, frusta] += slope[b].astype(np.float32)
-        self._factor = sla.cho_factor(self._system.T, lower=False, check_finite=False)      # the transpose is in LAPACK's order
-        self.per_depth = self.solve(np.arange(len(self.rows)) < len(a))
-
-    def serves(self, state, slope, share):
-        """Whether the active sets are unchanged, and the slopes within a share of those of the factorisation."""
-        same = np.array_equal(state.touching, self._touching) and np.array_equal(state.standing, self._standing)
-        return same and bool((np.abs(slope - self.slope) <= share * self.slope).all())
-
-    def solve(self, right):
-        """The solution (rows,), with the residual of single precision corrected once."""
-        first = sla.cho_solve(self._factor, right.astype(np.float32), check_finite=False)
-        missing = (right - self._system @ first).astype(np.float32)
-        return first + sla.cho_solve(self._factor, missing, check_finite=False).astype(float)
