@@ -38,6 +38,7 @@ def test_without_scatter_of_thickness_the_sensor_stays_as_it_is():
 
 def test_a_preset_is_a_mesh_by_name_that_other_keys_change():
     assert mesh_settings({"preset": "draft"}) == MeshSettings.draft() and mesh_settings({"preset": "fine"}) == MeshSettings.fine()
+    assert mesh_settings({"preset": "light"}) == MeshSettings.light()
     assert mesh_settings({"preset": "draft", "cover_splits": [1, 1]}) == replace(MeshSettings.draft(), cover_splits=(1, 1))
     assert newton_settings({"preset": "draft"}) == NewtonSettings.draft() and newton_settings({}) == NewtonSettings()
     looser = newton_settings({"preset": "draft", "largest_penetration_mm": 0.02})

@@ -12,13 +12,16 @@ DOCUMENT = HERE.parents[1] / "docs" / "reference" / "verification.md"
 INTRODUCTION = """\
 # Verification: are the equations solved right?
 
-Most rows compare the code with a number that it did not produce itself: a closed form, a published value or another program. Some
-compare it with itself: with a plain solver of this project that lacks the fast methods, a finer mesh, more steps, or the same press
-without an effect (their source says so: "plain", "bonded tips", "the press without friction", "limit of refinement", "finite
-differences" and the like). Those show that two ways agree; a fault in what both share, such as the law or the contact's definition,
-they do not show. The tests in `tests/verification/` state the number and its source first, then compare, and
-give a reason for each tolerance. Whether these are the right equations for a real sensor (validation) is another question, which
-this page does not answer.
+More than half of the rows compare the code with a number that it did not produce itself: a closed form, a published value or
+another program. The others compare it with a principle (conservation of energy, symmetry, frame indifference, the patch test)
+or with itself: with a plain solver of this project that lacks the fast methods, a finer mesh, more steps, differences of its
+own forces, or the same press without an effect (their source says so: "plain", "naive", "bonded tips", "the press without
+friction", "limit of refinement", "central differences" and the like). Those show that two ways agree; a fault in what both
+share, such as the law or the contact's definition, they do not show. CalculiX solved single elements, frusta, blocks and cells
+for this page. Pads of up to 24 frusta are compared in the notebook ([decks](../notebook/2026-11-23-decks-against-calculix.md)),
+a whole sensor was not. The tests in `tests/verification/` state the number and its source first, then compare, and give a
+reason for each tolerance. Whether these are the right equations for a real sensor (validation) is another question, which this
+page does not answer.
 
 The tests write this page, if all of them pass:
 

@@ -138,3 +138,13 @@ def test_the_sensors_frustum_is_a_tenth_too_stiff_at_most(record):
     """The default mesh: most of it comes from the volumetric stiffness at every point, without which the whole sensor stalls."""
     errors = compare(frustum(), "default mesh", record)
     assert (errors > 0).all() and (errors < [0.1, 0.1, 0.1, 0.05, 0.03]).all()
+
+
+def test_the_light_mesh_meets_calculix_with_the_unknowns_of_the_default_one():
+    """Its ring of elements at the rim: 0.2 % at a tenth of the height, then softer, by 2.6 % where the sides lie on the glass.
+
+    The default mesh is off by 5.4, 7.1, 5.9, 1.3 and 0.7 %.
+    """
+    light, default = frustum(mesh=MeshSettings.light()), frustum()
+    assert len(light.inner) == len(default.inner)
+    assert (np.abs(bonded_forces(light) / FORCES - 1) < [0.01, 0.01, 0.03, 0.03, 0.04]).all()

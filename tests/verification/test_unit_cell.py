@@ -128,6 +128,14 @@ def test_the_default_mesh_is_a_tenth_too_stiff_at_most(limit, record):
     assert limit < got < 1.12 * limit
 
 
+def test_the_light_mesh_is_within_two_per_cent_with_no_more_unknowns(limit, record):
+    """Its elements are smallest at the rim of tip and root, and its pressure is linear; for presses that fold no frustum."""
+    got = cell_stiffness(MeshSettings.light())
+    record("unit cell, light mesh: stiffness, MPa/mm", expected=limit, source=SOURCE, got=got)
+    light, default = (build_unit_cell(CORO, dielectric_law=LAW, mesh=mesh) for mesh in (MeshSettings.light(), MeshSettings()))
+    assert limit < got < 1.02 * limit and len(light.support.inner) == len(default.support.inner)
+
+
 @pytest.mark.parametrize("truth", ["a", "b"])
 def test_a_truths_elements_do_not_lock_in_nearly_incompressible_rubber(truth):
     """With K / mu0 of 200 the truths of config/decide.yaml are as near to a mesh of elements split once as with 20.

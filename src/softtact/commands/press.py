@@ -67,10 +67,10 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="how auto chooses: by the error to expect (default), or by the mesh's complexity as in the paper")
     command.add_argument("--tolerance", type=float, default=0.01, metavar="MM",
                          help="for the policy error: root mean square error over the map, in mm (default: 0.01)")
-    command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine"), default="default",
+    command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine", "light"), default="default",
                          help="mesh of the hyperelastic model: default (error 1 to 2 %% of the map's maximum), draft (2 to 5 %%, "
-                              "half of the time), fine (1 %%, twice the time) or stable (for frusta pressed deeper than "
-                              "half of their height)")
+                              "half of the time), fine (1 %%, twice the time), stable (for frusta pressed deeper than "
+                              "half of their height) or light (softer frusta, pressed by less than a third)")
     command.add_argument("--device", default="cpu", metavar="DEVICE",
                          help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is "
                               "one), with the extra device")
