@@ -276,6 +276,7 @@ def test_a_refusal_is_one_sentence_and_a_status(refused):
         (["press", "none.stl", "--unit", "mm", "--force", 5], 1, "none.stl"),
         (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--out", "deck.inp"], 2, "--format"),
         (["stage", "no_such_stage"], 1, "no_such_stage"),
+        (["press", OBJECT, "--unit", "mm", "--force", 5, "--weight", 3], 2, "softtact press: --weight is no option or argument"),
         (["stage", "fit_material", "--in", "curves"], 1, "NAME=PATH"),
         (["stage", "fit_material", "--settings", "{"], 1, "JSON"),
         (["prss"], 2, "prss"),

@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import yaml
+from support.pages import numbers_without_a_file
 
 from softtact.cli import main
 from softtact.files import read_dataset
@@ -25,6 +26,7 @@ def test_the_command_writes_tables_pictures_fields_and_a_page(tmp_path, capsys):
     assert len(curves) == 2 * (3 + 2) and (curves.film_left_n > 0).all()
     page = (tmp_path / "out/report.html").read_text()
     assert page.count("data:image/png") == 3 and "polystyrene has 3,000 to 3,600 MPa" in page
+    assert numbers_without_a_file(page) == []
     films = read_dataset(tmp_path / "out/dragon_skin_20_load.nc").film_force_n
     assert films.dims == ("step", "film") and films.shape == (2, 4)
     assert (tmp_path / "out/fields_dragon_skin_20.vtu").stat().st_size > 0

@@ -8,7 +8,7 @@ import trimesh
 
 import softtact
 from softtact.cli import main
-from softtact.commands.press_each import _lines
+from softtact.commands.press_each import ON_LAYERS, _lines
 
 HOW = ["--unit", "mm", "--force", "5", "--model", "elastic"]
 
@@ -85,3 +85,10 @@ def test_a_value_that_begins_with_a_minus_and_reads_as_an_option_gets_a_hint(wor
 def test_the_tables_headings_stand_apart_over_short_names_too():
     row = {"object": "a", "status": "failed", "model": None}
     assert next(_lines([row], "results")).split()[:2] == ["object", "status"]
+
+
+@pytest.mark.parametrize(("valid", "word"), [(1.0, "yes"), (0.0, "no")])
+def test_the_table_says_yes_or_no_to_validity_as_a_single_press_does(valid, word):
+    row = {"object": "a", "status": "done", "model": "elastic", **{column.name: 1.0 for column in ON_LAYERS}, "valid": valid}
+    heading, line, _ = _lines([row], "results")
+    assert line.split()[-1] == word and len(line) == len(heading)

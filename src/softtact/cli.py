@@ -57,7 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         import argcomplete
 
         argcomplete.autocomplete(parser)
-    options = parser.parse_args(arguments)
+    options, unknown = parser.parse_known_args(arguments)
+    if unknown:
+        command = f"softtact {options.command}"
+        parser.exit(2, f"{command}: {unknown[0]} is no option or argument of it; see {command} --help.\n")
     options.given = list(sys.argv[1:] if arguments is None else arguments)
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, options.command, set())

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import trimesh
+from support.pages import numbers_without_a_file
 
 from softtact.files import write_csv, write_json
 from softtact.reporting import render
@@ -190,6 +191,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
                                                     "models": {"felt": {"friction": {"object": 0.3}},
                                                                "hyper": {"mesh": {"preset": "draft"}}}}}
     page = render_page(inputs, facts, folder=folder, run=NO_RUN)
+    assert numbers_without_a_file(page) == []
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page

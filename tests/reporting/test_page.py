@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from support.pages import numbers_without_a_file
 
-from softtact.reporting.page import Page
+from softtact.reporting.page import CONFIGURATION, Page
 from softtact.reporting.words import header, in_words
 
 TABLE = pd.DataFrame({"line_n_mm": [53.9987, np.nan], "meets_all": [True, False], "elastomer": ["ecoflex_00_30", "Somafoama"],
@@ -35,6 +36,15 @@ def test_a_page_begins_with_what_was_asked_found_how_sure_and_synthetic_and_link
     places = [text.index(words) for words in ("What was asked", "It holds at 5 N.", "How sure", "What is synthetic", "<nav>")]
     assert places == sorted(places)
     assert '(<a href="tables/scores.csv">numbers</a>)' in text and text.count("<li>") == 0      # an empty sentence is no bullet
+
+
+def test_a_number_in_the_head_without_a_link_is_found_and_a_place_of_the_page_is_a_link(tmp_path):
+    page = Page("A study", "tiny", folder=tmp_path)
+    page.opening(asked=[("Pressed with 5 N.", CONFIGURATION)], found="7 hold.", sure="Few do.")
+    page.configuration("force_n: 5")
+    text = page.render()
+    assert f'Pressed with 5 N. (<a href="{CONFIGURATION}">numbers</a>)' in text and 'id="configuration"' in text
+    assert numbers_without_a_file(text) == ["7 hold."]
 
 
 def test_a_part_of_the_head_without_sentences_is_left_out(tmp_path):

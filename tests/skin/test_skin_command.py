@@ -9,6 +9,7 @@ import pytest
 import trimesh
 import yaml
 from PIL import Image
+from support.pages import numbers_without_a_file
 
 from softtact.cli import main
 from softtact.files import read_dataset
@@ -42,7 +43,7 @@ def test_a_design_becomes_readings_figures_exports_and_a_report(tmp_path, capsys
     assert readings.delta_ff.values == pytest.approx(readings.capacitance_ff.values - readings.at_rest_ff.values)
     assert readings.displacement_mm.sel(axis="z").min() < -0.1
     page = (tmp_path / "out/report.html").read_text()
-    assert page.count("data:image/png") == 2 and "exports/skin.urdf" in page
+    assert page.count("data:image/png") == 2 and "exports/skin.urdf" in page and numbers_without_a_file(page) == []
     assert (tmp_path / "out/exports/skin.txt").read_text().count("\n") == 16
 
 

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 import xarray
 import yaml
+from support.pages import numbers_without_a_file
 
 from softtact.cli import main
 from softtact.errors import InputError
@@ -55,6 +56,7 @@ def test_a_study_leaves_grasps_readings_claims_figures_and_a_report(results):
     assert (xarray.load_dataset(out / "grasps/object_3-0/readings.nc", engine="h5netcdf").tactile_map.shape) == (2, 2, 7, 4)
     page = (out / "report.html").read_text()
     assert "needs the archive" in page and page.count("data:image/png") == 1 and (out / "tables/claims.csv").exists()
+    assert numbers_without_a_file(page) == []
 
 
 def test_what_is_done_is_not_done_again_and_other_settings_are(results):

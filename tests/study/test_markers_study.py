@@ -10,6 +10,7 @@ import pytest
 import yaml
 from made_up_gel import CAMERA_PX, MARKERS, MM_PER_PX, RADIUS_PX, made_up_frames, rest_px
 from scipy.spatial import cKDTree
+from support.pages import numbers_without_a_file
 
 from softtact.errors import InputError
 from softtact.evaluation.decisions import CONTRADICTION, NOT, REPRODUCED, UNDECIDED
@@ -370,3 +371,4 @@ def test_all_stages_run_on_a_made_up_gel(study_file, tmp_path, monkeypatch):
     assert cKDTree(rest_px()).query(stored.marker_px.values[0])[0].max() < 1e-6
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "No real image of this sensor is here" in page and 'id="drag-data"' in page
+    assert numbers_without_a_file(page) == []

@@ -23,7 +23,7 @@ class Column:
     title: str
     """Its heading in the printed table."""
     style: str
-    """Its format in the printed table: width and digits."""
+    """Its format in the printed table: width and digits, or "7s" for yes and no."""
     of: Callable[[dict[str, Any]], float]
     """Its value at the last load step of a summary."""
 
@@ -58,7 +58,7 @@ ON_LAYERS = (Column("force_n", "force, N", "9.4g", last("normal_force_n")),
              Column("counts", "counts", "9.0f", _counts),
              Column("expected_error_mm", "error, mm", "11.4f", _last_or_nan("expected_error_mm")),
              Column("taxels_at_range_end", "at end", "8.0f", _last_or_nan("taxels_at_range_end")),
-             Column("valid", "valid", "7.0f", last("within_validity")))
+             Column("valid", "valid", "7s", last("within_validity")))
 ON_SOLIDS = (*(_force(axis, place) for place, axis in enumerate("xyz")),
              Column("largest_displacement_mm", "most moved, mm", "16.4f", last("largest_displacement_mm")),
              Column("largest_pressure_mpa", "pressure, MPa", "15.4g", last("largest_pressure_mpa")))
@@ -170,12 +170,22 @@ def _show(rows, folder, options, columns):
     show({"objects": table, "written": str(folder)}, as_json=options.json, lines=_lines(table, folder, columns))
 
 
+def _width(column):
+    return int(column.style.partition(".")[0].removesuffix("s"))
+
+
+def _shown(value, style):
+    if style.endswith("s"):
+        return "yes" if value else "no"
+    return f"{value:{style}}"
+
+
 def _lines(table, folder, columns=ON_LAYERS):
     width = max(len("object"), *(len(row["object"]) for row in table)) + 2
-    titles = "".join(f"{column.title:>{column.style.partition('.')[0]}}" for column in columns)
+    titles = "".join(f"{column.title:>{_width(column)}}" for column in columns)
     yield f"{'object':{width}}{'status':15}{'model':14}{titles}"
     for row in table:
         numbers = "" if row["model"] is None else f"{row['model']:14}" + "".join(
-            f"{row[column.name]:{column.style}}" for column in columns)
+            f"{_shown(row[column.name], column.style):>{_width(column)}}" for column in columns)
         yield f"{row['object']:{width}}{row['status']:15}{numbers}".rstrip()
     yield f"written: {folder}"

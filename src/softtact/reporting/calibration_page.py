@@ -25,10 +25,10 @@ def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[s
     page.opening(
         asked="Which numbers of the sensor, and which places of the objects, give the recorded counts? From "
               f"{'; '.join(one.name for one in problem.experiments)}, by the {problem.presses.model} model.",
-        found=f"The calibrated sensor misses the recorded counts by {result.misfit:.2f} times the noise ({noise:.1f} counts a "
-              "reading).",
-        sure=["A misfit beyond noise counts as noise in the standard deviations. The error of the model is in them, too: from "
-              f"these misfits and what is known of it, {100 * result.model_error:.1f} % of a map.",
+        found=[(f"The calibrated sensor misses the recorded counts by {result.misfit:.2f} times the noise ({noise:.1f} counts a "
+                "reading).", "#found")],
+        sure=[("A misfit beyond noise counts as noise in the standard deviations. The error of the model is in them, too: from "
+               f"these misfits and what is known of it, {100 * result.model_error:.1f} % of a map.", "#found"),
               *(f"These presses leave open: {sentence}" for sentence in result.not_identifiable), *notes])
     page.section("The numbers", anchor="found")
     page.table(pd.DataFrame(_rows(result), columns=["number", "value", "standard deviation"]))

@@ -21,8 +21,10 @@ Links = Sequence[tuple[str, Sequence[tuple[str, str]]]]
 """Groups of links: a label ("" for none), and (text, address) of each link."""
 
 Sentences = str | Iterable[str | tuple[str, str | Path | None]]
-"""One sentence or several, each alone or with the file that holds its numbers."""
+"""One sentence or several, each alone or with the file that holds its numbers, or with a place of a page, such as "#design"."""
 
+CONFIGURATION = "#configuration"
+"""The place of a page that `Page.configuration` makes."""
 _MOST_LINKS = 4      # of a group below a figure; the others are folded
 
 
@@ -110,6 +112,12 @@ class Page:
             row["link"] = row["evidence"] if there else ""
         self._add("claims", columns=list(claims.columns), rows=rows)
 
+    def configuration(self, text: str) -> None:
+        """The section with a study's configuration, or a design, and all its defaults."""
+        self.section("Configuration", anchor=CONFIGURATION.removeprefix("#"))
+        self.text("With all defaults.")
+        self.code(text)
+
     def code(self, text: str, *, title: str = "") -> None:
         """A preformatted text, such as a configuration or a program; the title is also its anchor."""
         self._add("code", text=text, title=title, anchor=title)
@@ -133,7 +141,8 @@ class Page:
     def _items(self, sentences):
         """Dicts of text and address of each sentence that is not empty."""
         pairs = [(one, None) if isinstance(one, str) else one for one in ([sentences] if isinstance(sentences, str) else sentences)]
-        return [{"text": text, "address": file and self.link(file)} for text, file in pairs if text]
+        return [{"text": text, "address": file and (str(file) if "#" in str(file) else self.link(file))}
+                for text, file in pairs if text]
 
     def _add(self, kind, **values):
         self._parts.append({"kind": kind} | values)

@@ -57,6 +57,9 @@ TITLES = {"summary": "Scores with their 95 % interval, by set",
           "table2": "Table 2. Complexity and choice of model",
           "counts": "The archive's counts against those in print",
           "table3": "Table 3. Time per tactile map"}
+SOURCES_PAGE = "sources.html"
+_CONFIGURED = f"{SOURCES_PAGE}#config"
+_CONFIGURATION = ("", [("Configuration", _CONFIGURED)])
 _QUESTION = ("Does choosing between an elastic and a hyperelastic model by an object's complexity give what a soft tactile sensor "
              "reads, in less time than the hyperelastic model alone?")
 _MODULE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
@@ -80,12 +83,13 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     page = Page("Simulating a soft tactile sensor: the study", settings["study"], folder=folder)
     claims = read_csv(inputs["claims"], keep_default_na=False)
     page.opening(
-        asked=[_QUESTION, _archive_facts(settings, archive) if archive else _facts(settings)],
+        asked=[_QUESTION,
+               (_archive_facts(settings, archive), inputs["inventory"]) if archive else (_facts(settings), _CONFIGURED)],
         found=[*((sentence, inputs["scores"]) for sentence in read_json(inputs["verdicts"])["sentences"]),
                (counted(claims), inputs["claims"])],
-        sure=[*missing(settings, archive=archive is not None),
+        sure=[*((sentence, _CONFIGURED) for sentence in missing(settings, archive=archive is not None)),
               (range_end_sentence(read_csv(inputs["gains"]), settings["config"]), inputs["gains"]) if "gains" in inputs else ""],
-        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings))
+        synthetic=[(_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings), inputs["ftir"])])
     for text, anchor in (("Configuration", "config"), ("Code", "code")):
         page.other_page(text, f"{SOURCES_PAGE}#{anchor}")
     _show_figures(page, inputs["figures"], settings["sources"], {"fig5_ftir": ftir["verdict"]})
@@ -99,7 +103,6 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     return page.render()
 
 
-SOURCES_PAGE = "sources.html"
 
 
 def render_sources(paths: Iterable[str | Path], *, study: str, config: str, named: str, page: str) -> str:
@@ -158,7 +161,6 @@ def _show_tables(page, inputs, config):
             page.table(table, title, file=inputs[name], links=[code, _CONFIGURATION])
 
 
-_CONFIGURATION = ("", [("Configuration", f"{SOURCES_PAGE}#config")])
 
 
 def _facts(settings):

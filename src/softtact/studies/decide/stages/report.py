@@ -34,8 +34,8 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
         asked="Does the hyperelastic model show detail that the elastic one loses, is that more than stiffness, and is a hybrid of "
               "both as accurate for less time? Each model is compared with several truths, object by object.",
         found=[(counted(judged), inputs["claims"]),
-               *(f"{one.claim}: {one.verdict}." for one in judged[judged["where"] != "control"].itertuples())],
-        sure=[*(f"{one.claim}: {one.verdict}." for one in judged[judged["where"] == "control"].itertuples()),
+               *((f"{one.claim}: {one.verdict}.", inputs["claims"]) for one in judged[judged["where"] != "control"].itertuples())],
+        sure=[*((f"{one.claim}: {one.verdict}.", inputs["claims"]) for one in judged[judged["where"] == "control"].itertuples()),
               ("A difference counts only where its 95 % interval over objects and seeds is clear of its bound; the tests of one "
                "claim share their level by Holm's rule.", inputs["hypotheses"]),
               ("What the study could see at all was stated before the scores.", inputs["power"])],
@@ -55,8 +55,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     page.table(mean_scores(tables["scores"]), file=inputs["scores"])
     for name, title in _TITLES.items():
         page.table(tables[name], title, file=inputs[name], most_rows=_MOST_ROWS)
-    page.section("Configuration")
-    page.code(settings["config"])
+    page.configuration(settings["config"])
     page.write(outputs["page"])
 
 

@@ -93,7 +93,8 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.opening(asked="What do the two sensors of a gripper read while a robot grasps objects in simulation, and does the paper's "
                        "choice of a model hold there?",
                  found=[(done, inputs["table"]), (counted(claims), inputs["claims"])],
-                 sure=care or "Every press is within what its model is valid for, and no taxel is at the end of its range.",
+                 sure=[(sentence, inputs["table"]) for sentence in care] or (
+                     "Every press is within what its model is valid for, and no taxel is at the end of its range."),
                  synthetic="Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No score here is "
                            "the paper's.")
     page.figures(zip(inputs["figures"], settings["captions"], strict=True))
@@ -101,8 +102,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.section("Grasps")
     page.table(grasps[[name for name in _SHOWN if name in grasps]], file=inputs["table"],
                links=[("Each grasp in time", [("grasps", "grasps")])])
-    page.section("Configuration")
-    page.code(settings["config"])
+    page.configuration(settings["config"])
     page.write(outputs["page"])
 
 

@@ -84,12 +84,12 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.opening(
         asked=[
             "Which network makes the marker images of a gel from depth images best, and how near do they come to solved images?",
-            *_facts(facts, settings),
+            *((sentence, inputs["facts"]) for sentence in _facts(facts, settings)),
         ],
         found=[*_best_networks(tables["table1"], inputs["table1"]), (counted(tables["claims"]), inputs["claims"])],
         sure=[
             ("The solved images, their markers found by the same detector, are the floor of all errors.", inputs["table1"]),
-            "A claim is decided only where its 95 % interval over objects is clear of its limit.",
+            ("A claim is decided only where its 95 % interval over objects is clear of its limit.", inputs["claims"]),
         ],
         synthetic="No real image of this sensor is here. The images that networks learn from, and are scored on, "
         "are our own: solved by the elastic model and drawn by the camera readout. A network can only come near that physics, "
@@ -114,8 +114,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.section("More tables")
     for name, title in _TITLES.items():
         page.table(_worded(tables[name]), title, file=inputs[name], most_rows=_MOST_ROWS)
-    page.section("Configuration")
-    page.code(settings["config"])
+    page.configuration(settings["config"])
     page.write(outputs["page"])
 
 

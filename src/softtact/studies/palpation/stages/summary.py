@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
 from softtact.files import digest, read_csv, read_json, write_json
 from softtact.probe.design import PalpationDesign
 from softtact.studies.palpation.claims import NOT_JUDGED
@@ -30,27 +32,29 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
 
     inputs: tables, figures, facts, fields, sweeps (lists);  outputs: page, summary (JSON);  settings: design (all values)
     """
-    from softtact.reporting.page import Page
+    from softtact.reporting.page import CONFIGURATION, Page
 
     design = PalpationDesign.model_validate(settings["design"])
     facts: dict[str, Any] = {"lump": {}} | {name: value for path in inputs["facts"] for name, value in read_json(path).items()}
     files = {path.stem: path for path in inputs["tables"]}
     page = Page("Palpation sensor", design.name, folder=outputs["page"].parent)
     page.opening(
-        asked=["Do the forces on the films tell how hard a tissue is, and where a lump hides in it?", _conditions(design)],
+        asked=["Do the forces on the films tell how hard a tissue is, and where a lump hides in it?",
+               (_conditions(design), CONFIGURATION)],
         found=[*((sentence, files.get("hardness")) for sentence in _on_hardness(facts["hardness"])),
                *((sentence, files.get("lump_recovery")) for sentence in _on_lumps(facts))],
-        sure=[*_beyond_data(facts), *_on_claims(files["claims"]),
+        sure=[*((sentence, outputs["summary"]) for sentence in _beyond_data(facts)), *_on_claims(files["claims"]),
               *([("Slopes under other assumptions show what each of these is worth.", files["variants"])] if "variants" in files
                 else [])],
         synthetic=["All forces and deflections are computed; no sensor and no tissue was measured.",
-                   *(f"Assumed: {sentence}." for sentence in _assumptions(design))])
+                   *((f"Assumed: {sentence}.", CONFIGURATION) for sentence in _assumptions(design))])
     page.figures((path, _CAPTIONS[path.stem]) for path in inputs["figures"])
     page.tables(_TITLES, files)
     _show_claims(page, files["claims"])
     page.section("Files")
     page.text("", links=[(label, [(Path(path).name, page.link(path)) for path in paths]) for label, paths in (
         ("Curves", [files["curves"], *inputs["sweeps"]]), ("Fields for ParaView", inputs["fields"]))])
+    page.configuration(yaml.safe_dump(design.model_dump(mode="json"), sort_keys=False))
     page.write(outputs["page"])
     write_json(outputs["summary"], facts | {"design": design.name, "config_digest": digest(design.model_dump(mode="json"))})
 

@@ -43,14 +43,14 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.opening(
         asked="Do the models of gels with a camera give the forces, the markers and the colours that were measured?",
         found=[(counted(judged), inputs["claims"]),
-               *(f"{one.claim}: {one.ours} ({one.verdict})." for one in judged.itertuples())],
+               *((f"{one.claim}: {one.ours} ({one.verdict}).", inputs["claims"]) for one in judged.itertuples())],
         sure=["Force: moduli are fitted to the points that each row of the table names; all else is predicted.",
-              f"Markers: the gel (path {gel['path']}, distance {gel['distance_px']:.0f} px) is fitted to the first image; in other "
-              "images only the ball's place, depth and motion and the camera's shift are.",
+              (f"Markers: the gel (path {gel['path']}, distance {gel['distance_px']:.0f} px) is fitted to the first image; in "
+               "other images only the ball's place, depth and motion and the camera's shift are.", inputs["gel"]),
               "Shading: fitted to presses that are not among those of the scores; circles that are found use the held-out image "
               "itself to find where the ball is, labelled ones do not. The wheel's table was fitted to all presses by its makers."],
-        synthetic=[f"{one['presses']} presses: {one['source']}{'' if one['measured'] else '; synthetic, no measurement'}."
-                   for one in facts])
+        synthetic=[(f"{one['presses']} presses: {one['source']}{'' if one['measured'] else '; synthetic, no measurement'}.", path)
+                   for one, path in zip(facts, inputs["facts"], strict=True)])
     page.claims(tables["claims"], title="Claims", file=inputs["claims"])
     page.figures((path, _CAPTIONS[name]) for path, name in zip(inputs["figures"], settings["names"], strict=True))
     page.section("Tables")
@@ -61,8 +61,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.table(mean_scores(tables["shading"]), "Shading, mean over held-out presses", file=inputs["shading"])
     page.table(tables["ball_size"].drop_duplicates(["set", "model"]), "Size of the ball", file=inputs["ball_size"])
     page.table(circles_summary(tables["circles"]), "Labelled circles, medians over presses", file=inputs["circles"])
-    page.section("Configuration")
-    page.code(settings["config"])
+    page.configuration(settings["config"])
     page.write(outputs["page"])
 
 

@@ -47,7 +47,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
 
     inputs: tables, figures, facts, exports (lists), readings;  outputs: page, summary (JSON);  settings: design (all values)
     """
-    from softtact.reporting.page import Page
+    from softtact.reporting.page import CONFIGURATION, Page
 
     design = SkinDesign.model_validate(settings["design"])
     files = {path.stem: path for path in inputs["tables"]}
@@ -55,10 +55,11 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     write_json(outputs["summary"], {"skin": design.skin} | facts)
     page = Page("Robot skin", design.skin, folder=outputs["page"].parent)
     page.opening(
-        asked=["What does this robot skin feel, which layer suits it best, and what does it weigh?", _facts(design)],
+        asked=["What does this robot skin feel, which layer suits it best, and what does it weigh?",
+               (_facts(design), CONFIGURATION)],
         found=[(sentence, files.get(table)) for sentence, table in
                ((_chosen(design, facts), "choice"), (_mapped(facts), "detection"), (_laid(facts), "modules"))],
-        sure=[*facts["remarks"], *_on_claims(files)],
+        sure=[*((remark, outputs["summary"]) for remark in facts["remarks"]), *_on_claims(files)],
         synthetic="All readings are computed; no skin was built. Elastomers are as the papers measured them, the converter's stray "
                   "is assumed.")
     loads = read_csv(files["loads"])
@@ -69,9 +70,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.section("Files")
     page.text("Arrays with units, and the taxels for other programs.",
               links=[("", [(path.name, page.link(path)) for path in (inputs["readings"], *inputs["exports"])])])
-    page.section("Design")
-    page.text("With all defaults.")
-    page.code(yaml.safe_dump(design.model_dump(mode="json"), sort_keys=False))
+    page.configuration(yaml.safe_dump(design.model_dump(mode="json"), sort_keys=False))
     page.write(outputs["page"])
 
 
