@@ -82,7 +82,7 @@ def test_a_users_own_files_come_first_and_add_to_what_ships(tmp_path, monkeypatc
     own.mkdir(parents=True)
     (own / "mine.yaml").write_text(sensor_file("pad").read_text().replace("name: pad", "name: mine"))
     (own / "coro.yaml").write_text(sensor_file("coro").read_text().replace("name: coro", "name: my coro"))
-    shipped = {"coro", "digit", "gelsight_mini", "gelsight_wonkdim", "pad", "pad4x4", "sheet", "tsf85"}
+    shipped = {"coro", "digit", "gelsight_mini", "gelsight_wonkdim", "pad", "pad4x4", "sheet", "skin_module", "tsf85"}
     assert known_names("sensors") == sorted([*shipped, "mine"])
     loaded = {name: softtact.load_sensor(name).spec.name for name in ("mine", "coro", "tsf85", "pad")}
     assert loaded == {"mine": "mine", "coro": "my coro", "tsf85": "my coro", "pad": "pad"}
@@ -104,8 +104,8 @@ def test_a_users_own_sensor_may_be_of_an_own_and_of_a_shipped_material(tmp_path,
 def test_an_unknown_name_is_refused_in_one_sentence_with_the_known_ones(tmp_path, monkeypatch):
     for find, name, said in [
         (sensor_file, "cora", "There is no sensor 'cora' (did you mean 'coro'?); known are coro, digit, gelsight_mini, "
-                              "gelsight_wonkdim, pad, pad4x4, sheet, tsf85; write one of them, the path of a YAML file, or put "
-                              "yours at config/sensors/cora.yaml."),
+                              "gelsight_wonkdim, pad, pad4x4, sheet, skin_module, tsf85; write one of them, the path of a YAML "
+                              "file, or put yours at config/sensors/cora.yaml."),
         (material_file, "xyz", "There is no material 'xyz'; known are gel_silicone, neoprene, polyurethane, silicone; write one "
                                "of them, the path of a YAML file, or put yours at config/materials/xyz.yaml."),
         (sensor_file, "../materials/neoprene", "There is no sensor '../materials/neoprene'"),

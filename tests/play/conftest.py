@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 import trimesh
-from support.small_sensors import small_block, small_coro, small_gel
+from support.small_sensors import small_block, small_coro, small_gel, small_skin
 
 from softtact.play.solver import Solver
 from softtact.play.state import Object, State
@@ -12,7 +12,7 @@ from softtact.play.state import Object, State
 
 @pytest.fixture(scope="package")
 def folder(tmp_path_factory):
-    """A folder with ball.stl, small.yaml, gel.yaml and block.yaml with its mesh."""
+    """A folder with ball.stl, small.yaml, gel.yaml, block.yaml with its mesh, and skin.yaml."""
     folder = tmp_path_factory.mktemp("play")
     ball = trimesh.creation.icosphere(subdivisions=3, radius=4.0)
     ball.apply_translation([3.0, -2.0, 5.0])     # the origin is not its middle
@@ -20,6 +20,7 @@ def folder(tmp_path_factory):
     small_coro(folder)
     small_gel(folder)
     small_block(folder)
+    small_skin(folder)
     return folder
 
 
@@ -27,6 +28,12 @@ def folder(tmp_path_factory):
 def state(folder):
     """The ball on the small sensor."""
     return State(str(folder / "small.yaml"), Object(folder / "ball.stl", "mm"))
+
+
+@pytest.fixture(scope="package")
+def on_skin(state, folder):
+    """The ball on a skin, with a solver."""
+    return replace(state, sensor=str(folder / "skin.yaml"), force_n=0.3), Solver()
 
 
 @pytest.fixture

@@ -49,7 +49,7 @@ def test_a_file_without_a_kind_is_of_frusta():
 
 
 @pytest.mark.parametrize(("changes", "said"), [
-    ({"kind": "pillars"}, "at 'kind': 'pillars' is unknown; use frusta, layers or solid."),
+    ({"kind": "pillars"}, "at 'kind': 'pillars' is unknown; use frusta, layers, solid or skin."),
     ({"suport": "base"}, "there is no key 'suport'; did you mean 'support'?"),
     ({"support": "glue"}, "field 'support' is not usable: Input should be 'base' or 'none'"),
     ({"layers": []}, "field 'layers' is not usable: Tuple should have at least 1 item"),

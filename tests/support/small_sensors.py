@@ -32,6 +32,21 @@ force_range_n: [0, 20]
 """
 
 
+SKIN = """
+kind: skin
+skin: small_skin
+mesh: {spacing_mm: 3.0, layers: 2, field_spacing_mm: 3.0, field_layers: 2}
+loads: []
+"""
+
+
+def small_skin(folder: Path) -> Path:
+    """The file of a module of the papers' skins on coarse meshes."""
+    path = folder / "skin.yaml"
+    path.write_text(SKIN)
+    return path
+
+
 def small_block(folder: Path) -> Path:
     """The file of a solid of few elements, 12 x 16 x 6 mm with its middle at (26, 28) mm."""
     write_mesh(box((20, 20, 0), (32, 36, 6), (3, 4, 2), region="rubber"), folder / "block.vtu")

@@ -174,9 +174,9 @@ _REMEDIES = {"mesh_quality": "give a finer mesh to the sensor's file"}     # of 
 def _refuse_idle(options, spec):
     """Refuse an option without effect: on this sensor, in the named model, or because another option is missing."""
     if not spec.has_layers:
-        if options.model not in ("auto", "solid"):
+        if options.model not in ("auto", *spec.models):
             raise InputError(f"--model {options.model}: a sensor of kind {spec.kind}, such as {options.sensor}, is pressed "
-                             "only with the solid model; leave it out.")
+                             f"only with the {' or the '.join(spec.models)} model; leave it out.")
         for name in ("policy", "tolerance", "mesh_quality"):
             if getattr(options, name) != _DEFAULTS[name]:
                 raise InputError(f"{_given(options, name)}: it has no effect on a sensor of kind {spec.kind}; "

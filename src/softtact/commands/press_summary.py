@@ -33,7 +33,8 @@ def summary_on_solids(result: Any) -> dict[str, Any]:
               "largest_displacement_mm": np.nanmax(np.linalg.norm(result.displacement_mm, axis=2), axis=1),
               "largest_pressure_mpa": np.nanmax(result.contact_pressure_mpa, axis=(1, 2))}
     names = ("volume_ratio_range", "stretch_range", "extrapolated_volume_fraction", "penetration_mm", "residual_n", "iterations",
-             "increments", "reading_points_mm", "reading_displacement_mm", "reading_pressure_mpa", "wall_time_s")
+             "increments", "reading_points_mm", "reading_displacement_mm", "reading_pressure_mpa", "wall_time_s", "normal_force_n",
+             "within_validity", "validity_reason")
     numbers = values | {name: getattr(result, name) for name in names}
     facts = {"model": result.model, "solver": result.solver, "sensor": result.sensor}
     return facts | _times(result) | {name: or_none(value) for name, value in numbers.items()}
@@ -152,6 +153,11 @@ def lines_on_solids(summary: dict[str, Any], *, verbose: bool) -> Iterator[str]:
         read = (summary[f"reading_{name}"][-1] for name in ("displacement_mm", "pressure_mpa"))
         for point, displacement, pressure in zip(summary["reading_points_mm"], *read, strict=True):
             yield _row((*point, *displacement)) + f"{'-' if pressure is None else plain(pressure, 4):>15}"
+    for name, values in summary["readings"].items():
+        if not isinstance(values[-1], list) or not isinstance(values[-1][0], list):
+            numbers = values[-1] if isinstance(values[-1], list) else [values[-1]]
+            yield f"{name} at the last step: {', '.join('-' if one is None else plain(one, 4) for one in numbers)}"
+    yield from validity_lines(summary)
     yield from _extrapolated_line(summary, of="a region")
     if verbose:
         yield from _solver_lines(summary)

@@ -1,13 +1,15 @@
 """How a kind of sensor is pressed on the page: a `Bench` each, in `on_layers`, `on_skin` and `on_solid`."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 import numpy as np
 
 from softtact.geometry.repair import Mended
 from softtact.play.state import Press, State
 from softtact.press.result import PressResult
+
+_KEPT = 50     # results of long models, the latest
 
 
 @dataclass(frozen=True)
@@ -22,8 +24,35 @@ class Pressed:
     """Where the object's mesh is at the end: translation (3,) in mm with its depth, and quaternion (4,) w, x, y, z."""
     clearance_mm: np.ndarray | None = None
     """(y, x) in mm at the map's points: negative where object and surface touch, cut off a little beside them."""
-    done: bool = True
-    """False where the object only touches: the sensor has a long model alone, and it has not run."""
+    stage: Literal["touching", "coarse", "whole"] = "whole"
+    """touching: the sensor has a long model alone, and it has not run."""
+
+    @property
+    def draft(self) -> bool:
+        """Whether it is the coarse one."""
+        return self.stage == "coarse"
+
+    @property
+    def done(self) -> bool:
+        """Whether the object presses."""
+        return self.stage != "touching"
+
+
+class Results:
+    """The latest results of long models by their presses."""
+
+    def __init__(self) -> None:
+        self._of: dict[Press, PressResult] = {}
+
+    def get(self, press: Press) -> PressResult | None:
+        """The result of a press, by whichever model, if it is here."""
+        return self._of.get(replace(press, model=""))
+
+    def take(self, press: Press, result: PressResult) -> None:
+        """Take a result in."""
+        if len(self._of) >= _KEPT:
+            del self._of[next(iter(self._of))]
+        self._of[replace(press, model="")] = result
 
 
 class Bench(Protocol):
@@ -50,8 +79,12 @@ class Bench(Protocol):
         """Whether a long model runs by itself where the object rests."""
 
     @property
-    def has_draft(self) -> bool:
-        """Whether there is a coarse press while an object moves, and whole one after it."""
+    def first_force_n(self) -> float:
+        """Largest force with which the page begins on this sensor."""
+
+    @property
+    def refines(self) -> bool:
+        """Whether a whole press follows a coarse one as soon as the object rests."""
 
     @property
     def is_ready(self) -> bool:

@@ -31,13 +31,14 @@ _TOUCHES, _ALWAYS_MM = 0.02, 1e-3     # share of the depth, and mm, that object 
 class OnLayers:
     """Layers with held sides: without friction only the last place counts."""
 
-    has_draft = True
+    refines = True
     middle_mm = np.zeros(3)
 
     def __init__(self, sensor: Sensor) -> None:
         self.sensor = sensor
         self.size_mm = np.array([*sensor.spec.footprint_mm, sensor.spec.thickness_mm])
         self.force_range_n: tuple[float, float] = sensor.spec.force_range_n
+        self.first_force_n = self.force_range_n[1]
         self.long_on_release = bool(np.isfinite(sensor.spec.frustum_height_mm))     # the foundation model takes seconds
         self.models = (*(["foundation"] if self.long_on_release else []), "hyperelastic", "auto", "solid")
         self._draft: Sensor | None = None
@@ -55,12 +56,13 @@ class OnLayers:
 
     def press(self, state: State, mended: Mended, *, draft: bool) -> Pressed:
         """See `Bench`."""
+        draft = draft and self.refines
         press, result = self._press(state, mended, draft)
         at_end = Pose.from_values(state.pose(mended.mesh, moved=True))
         surface = self._surface(state, mended, at_end)
         down = first_touch_mm(self.sensor, surface) + float(result.indentation_mm[-1])
         end = at_end.translation_mm - [0.0, 0.0, down], at_end.rotation.as_quat(scalar_first=True)
-        return Pressed(press, result, end, _clearance(surface, result, down))
+        return Pressed(press, result, end, _clearance(surface, result, down), "coarse" if draft else "whole")
 
     def take(self, press: Press, result: PressResult) -> None:
         """See `Bench`."""
@@ -105,7 +107,7 @@ class OnLayers:
 class OnGel(OnLayers):
     """A gel, whose sides are far: one grid, with friction along the slide and the twist."""
 
-    has_draft = False
+    refines = False
 
     def _press(self, state, mended, draft):
         pose, load = state.pose(mended.mesh, moved=False), state.load

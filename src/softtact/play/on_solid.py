@@ -12,7 +12,7 @@ from softtact.fem.solid_mesh import fine_triangles
 from softtact.geometry.pose import Pose
 from softtact.geometry.repair import Mended
 from softtact.models.solid.result import SolidFields
-from softtact.play.bench import Pressed
+from softtact.play.bench import Pressed, Results
 from softtact.play.state import Press, State
 from softtact.press.kinds import solid_at_rest
 from softtact.press.objects import distance_to_touch
@@ -20,14 +20,13 @@ from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor
 from softtact.readout.registry import readings_of
 
-_KEPT = 50     # results, the latest
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 class OnSolid:
     """A body that the solid model alone presses."""
 
-    has_draft, is_ready, long_on_release = False, True, True
+    refines, is_ready, long_on_release = False, True, True
     models = ("solid",)
 
     def __init__(self, sensor: Sensor) -> None:
@@ -38,7 +37,9 @@ class OnSolid:
         self.middle_mm = np.append(0.5 * (low + high)[:2], high[2])
         self.size_mm = np.append(np.ptp(mesh.points[:, :2], axis=0), high[2] - mesh.points[:, 2].min())
         self.force_range_n: tuple[float, float] = sensor.spec.force_range_n
-        self._results: dict[Press, PressResult] = {}
+        self.first_force_n = self.force_range_n[1]
+        self._results = Results()
+        self.take = self._results.take
 
     def prepare(self) -> None:
         """See `Bench`."""
@@ -51,13 +52,8 @@ class OnSolid:
         touching = self._at_touch(mended.mesh, Pose.from_values(pose))
         if (result := self._results.get(press)) is not None:
             return Pressed(press, result, _moved(touching, result.solid))
-        return Pressed(press, self._at_rest(), (touching.translation_mm, touching.rotation.as_quat(scalar_first=True)), done=False)
-
-    def take(self, press: Press, result: PressResult) -> None:
-        """See `Bench`."""
-        if len(self._results) >= _KEPT:
-            del self._results[next(iter(self._results))]
-        self._results[press] = result
+        end = touching.translation_mm, touching.rotation.as_quat(scalar_first=True)
+        return Pressed(press, self._at_rest(), end, stage="touching")
 
     def follows(self, model: str) -> bool:
         """See `Bench`."""

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,8 @@ _QUALITY = 92               # of the picture as JPEG, which is made in a fifth o
 _LEAST_DEPTH_MM, _DEEPEST = 0.01, 0.6     # of a press by depth: least, and the largest share of the thickness
 _STEP_MM, _STEP_DEG, _STEP_LOAD = 0.5, 5.0, 1.1      # of the keys
 # Of the camera, in lengths of the sensor's longer side, and how many times farther away it is on a narrow screen.
-_PERSPECTIVE, _FARTHER = np.array([0.45, -1.25, 1.1]), 1.4
+_PERSPECTIVE, _FARTHER = np.array([0.45, -1.25, 1.1]), 1.6
+_WIDE = 0.75                # of the width of sensor and taxels, which is seen as well as so much of the length
 
 
 class Page:
@@ -42,9 +44,10 @@ class Page:
         self._gizmo_from = np.zeros(3)
         self._depth_from = 0.0
         self.tab = Tab(state, self, folder)
-        self.tab.long_on_release = self.tab.solver.bench(state.sensor).long_on_release
+        state = self.tab.state = replace(state, **self._borne(state, state.sensor))
         self._build_panel(state, sensors)
         self._build_scene()
+        self._fit_panel(state.sensor)
         self._add_keys()
         if recorded is not None:
             self._show_recording(recorded)
@@ -71,15 +74,15 @@ class Page:
 
     def show_long(self, words: str, result: PressResult | None, fast: Shown | None) -> None:
         """Show a long press: its progress, or its end with the difference to the fast model's of the same press."""
-        if result is None or fast is None:
+        if result is None:
             self._long_words.content = _plain(words)
             return
-        lines = [f"**{words}**: {result.indentation_mm[-1]:.3f} mm deep{_apart(result, fast.result)}."]
+        lines = [f"**{words}**: {result.indentation_mm[-1]:.3f} mm deep{_apart(result, fast)}."]
         if result.selection_reason:
             lines.append(f"Why this model: {_plain(result.selection_reason)}.")
         lines += [f"Not within validity: {why}." for why in result.validity_reason[-1:] if why]
         self._long_words.content = "\n\n".join(lines)
-        self._difference.image = pictures.comparison(result, fast.result)
+        self._difference.image = pictures.comparison(result, fast.result if fast else result)
         self._difference.visible = True
 
     def show_recorded(self) -> None:
@@ -193,14 +196,25 @@ class Page:
 
     def _choose_sensor(self):
         """Press on another sensor, with a load that it bears."""
-        name, state = self._sensor.value, self.tab.state
         try:
-            bench = self.tab.solver.bench(name)
+            self._fit_panel(self._sensor.value)
+            self.tab.change(sensor=self._sensor.value, **self._borne(self.tab.state, self._sensor.value))
         except SofttactError as error:
             self.refuse(str(error))
-            return
-        self.tab.change(sensor=name, force_n=min(state.force_n, bench.force_range_n[1]),
-                        depth_mm=min(state.depth_mm, _deepest_mm(bench)))
+
+    def _fit_panel(self, name):
+        """Ranges of the loads and long models as a sensor has them."""
+        bench = self.tab.solver.bench(name)
+        self._panel_of = name
+        self._force.max, self._depth.max = float(bench.force_range_n[1]), _deepest_mm(bench)
+        self._on_release.value = self.tab.long_on_release = bench.long_on_release
+        self._long.options = bench.models
+        self._long.value = self.tab.long_model = bench.models[0]
+
+    def _borne(self, state, name):
+        """The load of a state, as far as a sensor bears it."""
+        bench = self.tab.solver.bench(name)
+        return {"force_n": min(state.force_n, bench.first_force_n), "depth_mm": min(state.depth_mm, _deepest_mm(bench))}
 
     def _toggle_record(self):
         records = self.tab.record()
@@ -247,14 +261,14 @@ class Page:
     def _table(self, shown):
         """The numbers of a press as Markdown."""
         result, state = shown.result, shown.state
-        what = "coarse, while it moves" if shown.draft else "whole" if shown.done else "at first touch"
-        rows = [*(_rows_of(result) if shown.done else []), ("press", f"{what}, {_time(shown.seconds)}")]
+        rows = [*(_rows_of(result) if shown.done else []), ("press", f"{shown.stage}, {_time(shown.seconds)}")]
         notes = [*shown.remarks, *(f"Not within validity: {why}." for why in result.validity_reason[-1:] if why)]
         bench = self.tab.solver.bench(state.sensor)
-        if not shown.done:
-            notes.insert(0, f"This sensor has the {bench.models[0]} model alone, which takes seconds to minutes. It runs where the "
+        if shown.stage != "whole" and not bench.refines:
+            what = "This press is coarse" if shown.draft else "The object only touches"
+            notes.insert(0, f"{what}: the {bench.models[0]} model of this sensor takes seconds to minutes. It runs where the "
                             "object rests, or with Run below; the page goes on meanwhile.")
-        elif state.moves and isinstance(shown.press.load, float):
+        if state.moves and isinstance(shown.press.load, float):
             notes.append(f"The {result.model} model has no friction here: slide and twist only change the place.")
         head = f"| {result.model} model{'' if shown.done else ': not pressed yet'} | |\n|---|---|\n"
         return head + "\n".join(f"| {name} | {value} |" for name, value in rows) + "".join(f"\n\n{_plain(note)}" for note in notes)
@@ -288,8 +302,11 @@ class Page:
 
     def _show_sensor(self, shown):
         surface, tiles = pictures.surface_mesh(shown.result), pictures.taxel_mesh(shown.result)
+        if shown.state.sensor != self._panel_of:
+            self._fit_panel(shown.state.sensor)
         if shown.state.sensor != self._sensor_shown:
-            self._new_sensor(shown)
+            self._new_sensor(surface, tiles)
+            self._sensor_shown = shown.state.sensor
         if self._surface is None:
             self._surface = self._scene.add_glb("/surface", _glb(surface), cast_shadow=False)
         self._surface.glb_data = _glb(surface)
@@ -300,22 +317,20 @@ class Page:
         if self._tiles is not None:
             self._tiles.visible = tiles is not None
 
-    def _new_sensor(self, shown):
-        bench = self.tab.solver.bench(shown.state.sensor)
-        (width, length, height), middle = bench.size_mm, bench.middle_mm
-        self._scene.add_box("/board", dimensions=(1.04 * width, 1.04 * length, _BOARD_MM), color=_BOARD,
-                            position=tuple(middle - [0.0, 0.0, height + _BOARD_MM / 2]), cast_shadow=False)
-        self._force.max, self._depth.max = float(bench.force_range_n[1]), _deepest_mm(bench)
-        self._on_release.value = self.tab.long_on_release = bench.long_on_release
-        self._long.options = bench.models
-        self._long.value = self.tab.long_model = bench.models[0]
-        self._look(middle, max(width, length))
-        self._sensor_shown = shown.state.sensor
+    def _new_sensor(self, surface, tiles):
+        """A board below a new sensor, and the camera on it and its taxels."""
+        low, high = surface.bounds
+        width, length, _ = 1.04 * (high - low)
+        self._scene.add_box("/board", dimensions=(width, length, _BOARD_MM), color=_BOARD, cast_shadow=False,
+                            position=(*(0.5 * (low + high)[:2]), low[2] - _BOARD_MM / 2))
+        right = high[0] if tiles is None else tiles.bounds[1, 0]
+        middle, width = 0.5 * (low + [right, *high[1:]]), right - low[0]
+        self._look(middle, width, max(length, _WIDE * width, 2 * (high - low)[2]))
 
-    def _look(self, middle, size):
+    def _look(self, middle, width, size):
         """Show sensor and taxels beside the panel; above it on a narrow screen, where the panel is below."""
         narrow = self._client.camera.aspect < 1
-        at = middle + size * (np.array([0.5, -1.5, 0.0]) if narrow else np.array([0.6, 0.0, 0.0]))
+        at = middle + (np.array([0.1 * width, -1.7 * size, 0.0]) if narrow else np.array([0.25 * width, 0.0, 0.0]))
         self._client.camera.position = at + _PERSPECTIVE * size * (_FARTHER if narrow else 1.0)
         self._client.camera.look_at = at
 
@@ -381,12 +396,17 @@ def _rows_of(result: PressResult) -> list[tuple[str, str]]:
     return rows
 
 
-def _apart(result: PressResult, fast: PressResult) -> str:
-    """How far a fast model's map is from a long model's, in words; empty without two maps."""
-    if result.deformation_map_mm is None or fast.deformation_map_mm is None:
+def _apart(result: PressResult, fast: Shown | None) -> str:
+    """How far a fast press is from a long model's, in words; empty without two maps or two readings at places."""
+    if fast is None:
         return ""
-    rms = float(np.sqrt(((result.deformation_map_mm[-1] - fast.deformation_map_mm[-1]) ** 2).mean()))
-    return f"; the {fast.model} map differs by {rms:.4f} mm (root mean square)"
+    which = f"the {'coarse' if fast.draft else fast.result.model}"
+    if result.deformation_map_mm is not None and fast.result.deformation_map_mm is not None:
+        rms = float(np.sqrt(((result.deformation_map_mm[-1] - fast.result.deformation_map_mm[-1]) ** 2).mean()))
+        return f"; {which} map differs by {rms:.4f} mm (root mean square)"
+    both = zip(pictures.places_of(result), pictures.places_of(fast.result), strict=False)
+    return "".join(f"; {which} {one.name} differs by up to {np.abs(one.values - other.values).max():.4g} {one.units}"
+                   for one, other in both)
 
 
 def _glb(mesh: trimesh.Trimesh) -> bytes:

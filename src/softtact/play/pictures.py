@@ -26,7 +26,8 @@ _GAP = 0.15             # of a footprint's width, between the sensor and its boa
 _TILE = 0.92            # share of a taxel's side that its tile takes
 _SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 _DISC, _CORNERS = 0.05, 24      # radius of a place, as a share of the longer side, where its readout states none; corners of it
-_UNDER = 0.01           # of the longer side: depth of a module's triangle below its taxels
+_RIM = 1.1              # radius of the rim around a taxel on a module, over the taxel's
+_UNDER = 0.003          # of the longer side: depth of a module's triangle below its taxels
 
 
 @cache
@@ -81,7 +82,7 @@ def comparison(result: PressResult, fast: PressResult) -> np.ndarray:
         most = float(np.abs(apart).max())
         image = Image.fromarray(coloured(apart[::-1], -most, most, "coolwarm"))
         panels.append(_panel(image, f"less {fast.model}, up to {most:.3f} mm"))
-    elif result is not fast and (both := [(one, other) for one, other in zip(places_of(result), places_of(fast), strict=False)]):
+    elif result is not fast and (both := list(zip(places_of(result), places_of(fast), strict=False))):
         apart = both[0][0].values - both[0][1].values
         most = float(np.abs(apart).max())
         panels.append(_panel(_places_image(both[0][0], result, apart, (-most, most), "coolwarm"),
@@ -191,13 +192,12 @@ def taxel_mesh(result: PressResult) -> trimesh.Trimesh | None:
     discs = [_polygon(places.xy_mm + aside, _circle(places.radius_mm), 0.0, places.values, most)]
     deep = -_UNDER * (high - low).max()
     if not len(places.triangles_mm):
-        plate = _polygon(((low + high) / 2 + aside)[None], _SQUARE * (high - low), deep, np.zeros(1), most)
-        plate.visual.vertex_colors = _opaque(np.full((len(plate.vertices), 3), _PLATE))
-        discs.append(plate)
+        discs.append(_grey(_polygon(((low + high) / 2 + aside)[None], _SQUARE * (high - low), deep, np.zeros(1), most)))
     else:
         middle = places.triangles_mm.mean(axis=1)
         discs += [_polygon(middle[[k]] + aside, triangle - middle[k], deep, mean[None], most)
                   for k, (triangle, mean) in enumerate(zip(places.triangles_mm, _module_means(places), strict=True))]
+        discs.append(_grey(_polygon(places.xy_mm + aside, _RIM * _circle(places.radius_mm), deep / 2, places.values, most)))
     together: Any = trimesh.util.concatenate(discs)
     return together
 
@@ -212,9 +212,16 @@ def _circle(radius):
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
+def _grey(mesh):
+    mesh.visual.vertex_colors = _opaque(np.full((len(mesh.vertices), 3), _PLATE))
+    return mesh
+
+
 def _polygon(middles, corners, height, values, most):
-    """A mesh of one convex polygon (k, 2) around each of the middles (n, 2), coloured by values (n,)."""
-    k = len(corners)
+    """A mesh of one convex polygon (k, 2) around each of the middles (n, 2), seen from above, coloured by values (n,)."""
+    k, ahead = len(corners), np.roll(corners, -1, axis=0)
+    if (corners[:, 0] * ahead[:, 1] - corners[:, 1] * ahead[:, 0]).sum() < 0:
+        corners = corners[::-1]
     flat = (middles[:, None] + corners).reshape(-1, 2)
     fan = np.column_stack([np.zeros(k - 2, dtype=int), np.arange(1, k - 1), np.arange(2, k)])
     faces = (k * np.arange(len(middles))[:, None, None] + fan).reshape(-1, 3)

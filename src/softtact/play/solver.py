@@ -24,7 +24,13 @@ def _on_layers(sensor: Sensor) -> OnLayers:
     return OnGel(sensor) if sensor.spec.edge.far else OnLayers(sensor)
 
 
-BENCHES: dict[str, Callable[[Sensor], Bench]] = {"frusta": _on_layers, "layers": _on_layers, "solid": OnSolid}
+def _on_skin(sensor: Sensor) -> Bench:
+    from softtact.play.on_skin import OnSkin  # scikit-fem, of the extra `skin`
+
+    return OnSkin(sensor)
+
+
+BENCHES: dict[str, Callable[[Sensor], Bench]] = {"frusta": _on_layers, "layers": _on_layers, "solid": OnSolid, "skin": _on_skin}
 """By the kind of a sensor."""
 
 
@@ -33,8 +39,6 @@ class Shown(Pressed):
     """A press that is shown."""
 
     state: State
-    draft: bool
-    """Whether it is the coarse one."""
     seconds: float
     """Wall time of the computation."""
     remarks: tuple[str, ...]
@@ -66,13 +70,12 @@ class Solver:
         """
         start = time.perf_counter()
         bench, mended = self.bench(state.sensor), _mended(state.object)
-        draft = draft and bench.has_draft
         with _ALONE, warnings.catch_warnings(record=True) as caught, self._threads().limit(limits=1):
             warnings.simplefilter("always")
             pressed = bench.press(state, mended, draft=draft)
         remarks = tuple(dict.fromkeys(str(one.message) for one in caught if one.category.__module__.startswith("softtact.")))
         seconds = max(time.perf_counter() - start, float(pressed.result.wall_time_s.sum()))     # the press may be an earlier one
-        return Shown(**vars(pressed), state=state, draft=draft, seconds=seconds, remarks=remarks)
+        return Shown(**vars(pressed), state=state, seconds=seconds, remarks=remarks)
 
 
 @lru_cache(maxsize=8)

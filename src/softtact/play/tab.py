@@ -222,9 +222,9 @@ class Tab:
     def _save(self):
         state = self.state
         shown = self.shown if self.shown and self.shown.state == state and not self.shown.draft else self.solver.solve(state)
-        if not shown.done:
-            raise InputError(f"The object only touches: the {shown.press.model} model has not run for this press; press Run, and "
-                             "save when it has ended.")
+        if shown.stage != "whole":
+            raise InputError(f"This press is not whole: the {shown.press.model} model has not run for it; press Run, and save when "
+                             "it has ended.")
         also = self._long_of[1] if self._long_of and self._long_of[0] == state else None
         files = self._folder.save_press(shown.press, shown.result, None if also is shown.result else also)
         self._view.tell("Saved " + ", ".join(map(str, files)) + ".")
@@ -266,7 +266,8 @@ class Tab:
         if state == self._refused:
             return
         try:
-            if (new := self.shown is None or self.shown.state != state) or rests and self.shown.draft:
+            new, refines = self.shown is None or self.shown.state != state, self.solver.bench(state.sensor).refines
+            if new or rests and refines and self.shown.draft:
                 if new or self._is_ready(state.sensor):
                     self._publish(self.solver.solve(state, draft=new))
                 return
@@ -310,11 +311,11 @@ class Tab:
         try:
             result = long.result()
             self._long_of = state, result
+            fast = self.solver.solve(state)
             self.solver.bench(state.sensor).take(long.press, result)
-            shown = self.solver.solve(state)
-            if shown.result is result and state == self.state:
+            if state == self.state and (shown := self.solver.solve(state)).result is result:
                 self._publish(shown)
-            self._view.show_long(f"{result.model}, {long.seconds:.0f} s", result, shown)
+            self._view.show_long(f"{result.model}, {long.seconds:.0f} s", result, fast if fast.done else None)
         finally:
             self._end_long()
 

@@ -222,9 +222,31 @@ def solid_at_rest(sensor: "Sensor") -> SurfaceMotion:
     return surface_of(sensor, [np.zeros_like(sensor.elements.points)])      # type: ignore[union-attr]
 
 
+# --- sensors of kind skin ---
+
+
+def _load_skin(spec, laws):
+    from softtact.press.skin import load_skin
+
+    return load_skin(spec, laws)
+
+
+def _press_skin(sensor, task, *, model):
+    from softtact.press.skin import press_skin
+
+    return press_skin(sensor, task, model=model)
+
+
+def _skin_at_rest(sensor):
+    raise InputError(f"{sensor.spec.name}, a sensor of kind skin: it reads its own taxels; leave 'readouts' out.")
+
+
 KINDS: dict[str, Kind] = {
     "frusta": _LAYERS, "layers": _LAYERS,
-    "solid": Kind(load=_load_solid, at_rest=solid_at_rest, models={"auto": press_solid, "solid": press_solid})}
+    "solid": Kind(load=_load_solid, at_rest=solid_at_rest, models={"auto": press_solid, "solid": press_solid}),
+    "skin": Kind(load=_load_skin, at_rest=_skin_at_rest, models={
+        "auto": partial(_press_skin, model="elastic"), "elastic": partial(_press_skin, model="elastic"),
+        "solid": partial(_press_skin, model="solid")})}
 
 
 # --- readouts of files that few sensors name ---

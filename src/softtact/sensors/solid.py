@@ -79,6 +79,11 @@ class SolidSpec(Specification):
         self._folder = folder      # of its mesh
 
     @property
+    def models(self) -> tuple[str, ...]:
+        """Names of the models that press it."""
+        return ("solid",)
+
+    @property
     def mesh_path(self) -> Path:
         """Path of the mesh file, relative to the working folder."""
         return self._folder / self.mesh.file

@@ -3,6 +3,7 @@
     frusta   `SensorSpec`: a cover on a dielectric with frusta; the kind of a file without `kind`
     layers   `LayersSpec`: one or two plain layers
     solid    `SolidSpec`: any body of elements
+    skin     `SkinSpec`: a robot skin, by the design of `softtact skin`
 To add a kind, add a file with its class, a line to `KINDS`, and one to `press.kinds.KINDS` for loading and pressing it.
 """
 
@@ -17,12 +18,13 @@ from softtact.errors import InputError
 from softtact.sensors.base import DEFAULT_KIND, BaseSpec, Specification, read_mapping
 from softtact.sensors.frusta import ORIENTATIONS, Friction, SensorSpec
 from softtact.sensors.layers import LayersSpec
+from softtact.sensors.skin import SkinSpec
 from softtact.sensors.solid import SolidSpec
 
 __all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "Friction", "LayersSpec", "SensorSpec", "any_spec", "read_any_spec",
            "read_spec", "sensor_schema", "spec_from_dict"]
 
-KINDS: dict[str, type[Specification]] = {"frusta": SensorSpec, "layers": LayersSpec, "solid": SolidSpec}
+KINDS: dict[str, type[Specification]] = {"frusta": SensorSpec, "layers": LayersSpec, "solid": SolidSpec, "skin": SkinSpec}
 AnySpec = SensorSpec | LayersSpec     # any of layers
 
 
@@ -56,5 +58,6 @@ def _layered(spec):
 
 
 def sensor_schema() -> dict[str, Any]:
-    """JSON schema of a sensor file: one of the kinds."""
-    return TypeAdapter(Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]).json_schema()  # type: ignore[arg-type]
+    """JSON schema of a sensor file: one of the kinds, but skins, whose files are designs with a schema of their own."""
+    described = [spec for spec in KINDS.values() if spec is not SkinSpec]
+    return TypeAdapter(Annotated[reduce(or_, described), Field(discriminator="kind")]).json_schema()  # type: ignore[arg-type]

@@ -15,10 +15,10 @@ import scipy.sparse as sp
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.skin.elasticity import BondedLayer
 from softtact.skin.elastomers import Elastomer
-from softtact.skin.electrostatics import ElectricField
+from softtact.skin.electrostatics import VACUUM_FF_PER_MM, ElectricField
 from softtact.skin.layer_mesh import LayerMesh, even_mesh, taxel_mesh
 from softtact.skin.layout import Layout
-from softtact.skin.loads import Load, disc, refuse_beside
+from softtact.skin.loads import Load, disc, ellipse, refuse_beside
 
 _LARGE_STRAIN = 0.3     # of the thickness: the papers' elastomers were tested up to it
 _RATIOS = 6             # ratios of pressure to modulus solved for a curve, at the extrema of a Chebyshev polynomial
@@ -132,6 +132,10 @@ class Readings:
         return self.capacitance_ff - self.at_rest_ff
 
 
+_COARSE = LayerMeshSizes(spacing_mm=2.0, layers=2)     # of what follows an object that moves
+_BLOCK = 200     # columns of the compliance solved together
+
+
 class Skin:
     """A layer of elastomer on taxels. Meshes and factorisations are computed once for all loads."""
 
@@ -141,8 +145,14 @@ class Skin:
         self.layer = BondedLayer(
             LayerMesh(even_mesh(layout, spacing_mm=mesh.spacing_mm), np.linspace(0.0, thickness_mm, mesh.layers + 1)),
             poisson=poisson)
-        self.field_mesh = LayerMesh(taxel_mesh(layout, spacing_mm=mesh.field_spacing_mm),
-                                    np.linspace(0.0, thickness_mm, mesh.field_layers + 1))
+        self._field_sizes = mesh.field_spacing_mm, mesh.field_layers
+        self._columns: dict[int, np.ndarray] = {}
+
+    @cached_property
+    def field_mesh(self) -> LayerMesh:
+        """The mesh for the electric field."""
+        spacing, layers = self._field_sizes
+        return LayerMesh(taxel_mesh(self.layout, spacing_mm=spacing), np.linspace(0.0, self.thickness_mm, layers + 1))
 
     @cached_property
     def at_rest(self) -> ElectricField:
@@ -152,12 +162,31 @@ class Skin:
     @cached_property
     def at_rest_ff(self) -> np.ndarray:
         """Capacitances (taxel,) without a load."""
-        return self.at_rest.capacitance_ff
+        return self.capacitance_ff()
+
+    def capacitance_ff(self, displacement_mm: np.ndarray | None = None) -> np.ndarray:
+        """Capacitances (taxel,) in fF after a displacement (node, 3) of the layer's nodes, or at rest."""
+        return (self.at_rest if displacement_mm is None else self.field(displacement_mm)).capacitance_ff
 
     def field(self, displacement_mm: np.ndarray | None = None) -> ElectricField:
         """The field after a displacement (node, 3) of the layer's nodes, or at rest."""
         moved = None if displacement_mm is None else self.to_field @ displacement_mm
         return ElectricField(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved)
+
+    def compliance(self, nodes: np.ndarray) -> np.ndarray:
+        """Displacement down (c, c) in mm of nodes (c,) of the upper side under 1 N down on each, for a modulus of 1 MPa.
+
+        Columns are kept, so that an object that moves has most of them.
+        """
+        top = self.layer.mesh.top
+        missing = np.array([node for node in nodes if node not in self._columns], dtype=int)
+        for start in range(0, len(missing), _BLOCK):
+            block = missing[start:start + _BLOCK]
+            nodal = np.zeros((len(self.layer.mesh.nodes_mm), 3, len(block)))
+            nodal[block, 2, np.arange(len(block))] = -1.0
+            self._columns |= dict(zip(block, -self.layer.respond(nodal)[top, 2].T, strict=True))
+        rows = np.searchsorted(top, nodes)
+        return np.column_stack([self._columns[node][rows] for node in nodes])
 
     @cached_property
     def to_field(self) -> sp.csr_matrix:
@@ -180,6 +209,33 @@ class Skin:
         return load.force_n @ (self.layer.under(load.points_mm) @ self.influence) / young_mpa
 
 
+class CoarseSkin(Skin):
+    """A skin on a coarse mesh, whose taxels are parallel plates, in milliseconds.
+
+    A driven guard takes the fringes: a plate ends in the middle of the gap (Maxwell's guard ring). Over 24 random balls no taxel
+    was off by more than 28 % of the largest rise of `Skin`, half of the balls by less than 18 %; the sum by 1 % in the median.
+    """
+
+    def __init__(self, layout: Layout, *, thickness_mm: float, poisson: float, permittivity: float) -> None:
+        super().__init__(layout, thickness_mm=thickness_mm, poisson=poisson, permittivity=permittivity, mesh=_COARSE)
+        radius = 0.5 * (layout.radius_mm + layout.guard_radius_mm)
+        disc = ellipse((0.0, 0.0), area_mm2=np.pi * radius**2, pressure_mpa=1.0, ratio=1.0)
+        few = slice(0, None, 6)     # every sixth point around
+        self._area_mm2 = disc.force_n[few] * disc.force_n.sum() / disc.force_n[few].sum()
+        points = layout.centres_mm[:, None] + disc.points_mm[few]
+        self._over_taxels = self.layer.under(points.reshape(-1, 2))
+
+    def capacitance_ff(self, displacement_mm: np.ndarray | None = None) -> np.ndarray:
+        """See `Skin`. Raises InputError where the elastomer would be pressed through."""
+        down = np.zeros(len(self.layer.mesh.nodes_mm)) if displacement_mm is None else displacement_mm[:, 2]
+        gap = self.thickness_mm + (self._over_taxels @ down).reshape(-1, len(self._area_mm2))
+        if gap.min() <= 0:
+            raise InputError("load: it presses the elastomer through, where small strains do not hold; choose less pressure or a "
+                             "thicker or stiffer layer.")
+        found: np.ndarray = VACUUM_FF_PER_MM * self.permittivity * (self._area_mm2 / gap).sum(axis=1)
+        return found
+
+
 def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converter: Converter) -> Readings:
     """`Readings` of loads one by one, each solved with the elastomer's secant modulus at its pressure."""
     rows, tops, moduli, remarks = [], [], [], []
@@ -191,7 +247,7 @@ def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converte
         displacement = load.displacement_mm
         if displacement is None:
             displacement = skin.layer.displacement(load, young_mpa=young)
-        rows.append(skin.field(displacement).capacitance_ff)
+        rows.append(skin.capacitance_ff(displacement))
         tops.append(displacement[skin.layer.mesh.top])
         moduli.append(young)
         compression = -displacement[:, 2].min() / skin.thickness_mm

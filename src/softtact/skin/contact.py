@@ -8,7 +8,7 @@ import warnings
 
 import numpy as np
 import trimesh
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, nnls
 from scipy.spatial.transform import Rotation
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
@@ -30,7 +30,6 @@ from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
 
 _DEPTHS = (0.15, 0.3, 0.6)  # of the thickness: candidates for contact lie at most so far below the object's lowest point
-_BLOCK = 200  # columns of the compliance solved together
 _GUESS_MPA = 0.1
 _ITERATIONS, _TOLERANCE = 20, 1e-3  # of the secant modulus, which depends on the pressure
 _OBJECT, _LAYER = "object", "elastomer"
@@ -59,7 +58,7 @@ def contact_load(skin: Skin, mesh: trimesh.Trimesh, centre_mm: tuple[float, floa
         if indentation < depth * skin.thickness_mm:
             touching = forces > 0
             words = f"{force_n:g} N by {name} at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm, {1e3 * pressure:.3g} kPa in the mean"
-            return Load(nodes[near[touching]], forces[touching], pressure, words)
+            return Load(nodes[near[touching]], forces[touching], pressure, words, indentation_mm=indentation)
     raise InputError(f"load {name!r}: {force_n:g} N presses it deeper than {_DEPTHS[-1]:.0%} of the {skin.thickness_mm:g} mm of "
                      "elastomer, where small strains do not hold; choose a smaller force_n, or strains: finite.")
 
@@ -84,7 +83,7 @@ def underside(placed: trimesh.Trimesh, points_mm: np.ndarray, centre_mm: tuple[f
 
 def _contact_forces(skin, nodes, gap, force_n, elastomer):
     """Forces (c,) on nodes under gaps (c,), mean pressure and indentation, with the modulus at that pressure."""
-    compliance = _compliance(skin, nodes)
+    compliance = skin.compliance(nodes)
     node_area = skin.layout.area_mm2 / len(skin.layer.mesh.top)
     young = elastomer.young_gentle_mpa or _GUESS_MPA
     for _ in range(_ITERATIONS):
@@ -98,15 +97,22 @@ def _contact_forces(skin, nodes, gap, force_n, elastomer):
     return step.nodal_force, pressure, step.indentation
 
 
-def _compliance(skin, nodes):
-    """Compliance (c, c): displacement down of nodes under unit forces down, for a modulus of 1 MPa."""
-    columns = []
-    for start in range(0, len(nodes), _BLOCK):
-        block = nodes[start:start + _BLOCK]
-        nodal = np.zeros((len(skin.layer.mesh.nodes_mm), 3, len(block)))
-        nodal[block, 2, np.arange(len(block))] = -1.0
-        columns.append(-skin.layer.respond(nodal)[nodes, 2])
-    return np.concatenate(columns, axis=1)
+def force_at_depth(skin: Skin, mesh: trimesh.Trimesh, depth_mm: float, *, elastomer: Elastomer) -> float:
+    """The force (N) at which a placed mesh (mm) is pressed `depth_mm` below first touch, at small strains.
+
+    The nodes in contact follow from the depth alone; the force is in proportion to the modulus, found as in `contact_load`.
+    """
+    height = underside(mesh, skin.layer.mesh.nodes_mm[skin.layer.mesh.top, :2], tuple(mesh.bounds.mean(axis=0)[:2]), "mesh")
+    near = np.flatnonzero(height - height.min() < depth_mm)
+    factor = np.linalg.cholesky(skin.compliance(skin.layer.mesh.top[near]))     # A f >= depth - gap, f >= 0, complementary
+    forces, _ = nnls(factor.T, np.linalg.solve(factor, depth_mm - (height - height.min())[near]))
+    area = skin.layout.area_mm2 / len(skin.layer.mesh.top) * np.count_nonzero(forces)
+    young = elastomer.young_gentle_mpa or _GUESS_MPA
+    for _ in range(_ITERATIONS):
+        before, young = young, elastomer.tested_young_mpa(young * forces.sum() / area)
+        if abs(young / before - 1) < _TOLERANCE:
+            break
+    return float(young * forces.sum())
 
 
 def compression_law(elastomer: Elastomer) -> tuple[Law, float]:
@@ -188,4 +194,5 @@ def _load_of(body: SolidBody, step: SolidLoadStep, force_n: float, nodes: int, w
     words += f", {1e3 * force_n / area:.3g} kPa in the mean"
     if beyond > 0.005:
         words += f", {beyond:.0%} of the volume strained beyond the tests"
-    return Load(at, forces * (force_n / forces.sum()), force_n / area, words, step.state.displacement[:nodes])
+    return Load(at, forces * (force_n / forces.sum()), force_n / area, words, step.state.displacement[:nodes],
+                indentation_mm=-float(step.state.poses[0].translation[2]))

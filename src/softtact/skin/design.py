@@ -210,6 +210,7 @@ class SkinDesign(FiniteSection):
     link: Link | None = None
     search: Search | None = None
     claims: bool = False
+    force_range_n: tuple[float, PositiveFloat] = Field((0.0, 5.0), description="of presses on it as a sensor")
     kind: Literal["skin"] = "skin"
     study: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")] | None = None
 

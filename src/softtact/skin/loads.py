@@ -28,6 +28,8 @@ class Load:
     """Description for messages and tables."""
     displacement_mm: np.ndarray | None = None
     """(node, 3) of the layer under the load, where it was solved with it, at finite strains."""
+    indentation_mm: float = np.nan
+    """Of an object below first touch; nan of a pressure."""
 
     @property
     def total_n(self) -> float:
