@@ -37,6 +37,13 @@ class ObjectPoints:
     step: np.ndarray
     beneath: "Beneath | None" = None
 
+    @classmethod
+    def level(cls, nodes: np.ndarray, gap: np.ndarray, step: np.ndarray) -> "ObjectPoints":
+        """Points away from edges, as if the object were level over each."""
+        side = len(window_places())
+        return cls(nodes=nodes, gap=gap, slope=np.zeros((len(nodes), 2)), edge=np.zeros(0, dtype=np.int64),
+                   window=np.zeros((0, side, side), dtype=np.float32), step=step)
+
     @property
     def count(self) -> int:
         return len(self.nodes)

@@ -6,6 +6,8 @@ depth, the node gets both (`Beneath`). A part of the object between nodes, which
 (`narrow_parts`).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import binary_dilation
@@ -18,6 +20,7 @@ from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, Obje
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
 
+MISSES = "The object misses every free point of the sensor's surface; move it over the sensor."
 _SMOOTH = 0.6        # largest slope of a surface without an edge
 _KINK = 0.1          # change of slope from node to node that counts as an edge
 _FLAT = 0.05         # of a step: tolerance of the height of samples in a plane
@@ -36,7 +39,7 @@ class Underside:
         self._height, self._slope = self._coarse[:, 4], _slopes(surface, over_node)
         self.lowest_mm = min(float(self._coarse.min()), surface.first_touch_mm(grid.x, grid.y))
         if self.lowest_mm >= NO_CONTACT_MM:
-            raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
+            raise InputError(MISSES)
 
     def depth_on_springs(self, force_n: float, foundation_modulus: float) -> float:
         """First guess of the depth (mm) below first touch under a force: on a Winkler foundation of `foundation_modulus` N/mm3,
@@ -71,9 +74,7 @@ class Underside:
         slope = np.where((missed < self._height)[:, None], 0.0, self._slope)
         height = np.minimum(self._height, missed)
         kept = np.flatnonzero(height < self.lowest_mm + reach_mm)
-        side = len(window_places())
-        return ObjectPoints(nodes=kept, gap=height[kept], slope=slope[kept], edge=np.zeros(0, dtype=np.int64),
-                            window=np.zeros((0, side, side), dtype=np.float32), step=self._grid.step)
+        return replace(ObjectPoints.level(kept, height[kept], self._grid.step), slope=slope[kept])
 
     def narrow_parts(self, reach_mm: float) -> bool:
         """Whether the object has parts within `reach_mm` above its lowest point that no node is under."""

@@ -3,7 +3,6 @@
 A mesh is checked once (`ObjectSurface`), and no mesh is placed in a pose.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +10,6 @@ import numpy as np
 import trimesh
 
 from softtact.compiled import compiled
-from softtact.contact.height_field import HeightField
 from softtact.contact.lower_envelope import (
     NO_CONTACT_MM,
     facing_down,
@@ -23,7 +21,7 @@ from softtact.contact.lower_envelope import (
 from softtact.contact.narrow_parts import margin
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
-from softtact.contact.underside import Underside
+from softtact.contact.underside import MISSES
 from softtact.errors import InputError
 from softtact.geometry.meshes import check_given, check_over_sensor, default_pose, place
 from softtact.geometry.pose import Pose
@@ -48,18 +46,11 @@ class ObjectSurface:
     def over(self, target: "Target", pose: Pose | None) -> "PosedUnderside":
         """Its underside in a pose, None for the centred one. Raises InputError where it misses the sensor."""
         points = (pose or self.centred).apply(self._points)
-        heights, touch, shell = _underside(facing_down(points, self._facets)[0], *target.arrays)
-        if touch >= NO_CONTACT_MM:
-            self._refuse(target, pose)
-        stop = shell + target.shell.below_mm if shell < NO_CONTACT_MM else np.inf
-        return PosedUnderside(heights, touch, stop, float(points[:, 2].max()) - touch)
-
-    def _refuse(self, target, pose):
-        """Raise what a press alone raises of an object that no point of the map is under."""
-        placed = place(self.mesh, pose=pose)
-        check_over_sensor(placed, target.footprint_mm)
-        Underside(HeightField(placed), target.grid)
-        raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
+        try:
+            return underside_of(facing_down(points, self._facets)[0], target, top_mm=float(points[:, 2].max()))
+        except InputError:
+            check_over_sensor(place(self.mesh, pose=pose), target.footprint_mm)      # says where it is
+            raise
 
 
 @dataclass(frozen=True)
@@ -98,16 +89,16 @@ class PosedUnderside:
     """Height of its top over first touch."""
 
 
-def undersides(surfaces: Sequence[ObjectSurface], poses: Sequence[Pose | None],
-               target: Target) -> list["PosedUnderside | InputError"]:
-    """The underside of each object in its pose, or the error in its place."""
-    found: list[PosedUnderside | InputError] = []
-    for surface, pose in zip(surfaces, poses, strict=True):
-        try:
-            found.append(surface.over(target, pose))
-        except InputError as error:
-            found.append(error.with_traceback(None))
-    return found
+def underside_of(triangles: np.ndarray, target: Target, *, top_mm: float = np.nan) -> PosedUnderside:
+    """The underside of an object by its triangles that face down, (t, 3, 3) in mm in its pose; top_mm: height of its top.
+
+    Raises InputError where it misses all free points of the sensor's surface.
+    """
+    heights, touch, shell = _underside(triangles, *target.arrays)
+    if max(touch, heights.min()) >= NO_CONTACT_MM:
+        raise InputError(MISSES)
+    stop = shell + target.shell.below_mm if shell < NO_CONTACT_MM else np.inf
+    return PosedUnderside(heights, touch, stop, top_mm - touch)
 
 
 @compiled

@@ -249,19 +249,23 @@ class ParityBlocks:
 
     def fields(self, shape: tuple[int, int], columns: np.ndarray, column_signs: np.ndarray, loads: np.ndarray, *,
                every: int = 1) -> np.ndarray:
-        """Displacements (l, 2 ny - 1, 2 nx - 1) over the whole rectangle under loads (c, l) at places as for `between`.
+        """Displacements (l, 2 ny - 1, 2 nx - 1) over the whole rectangle under loads (c, l) at places as for `between`,
+        all different.
 
         shape: (rows, columns) of the quarter's nodes, whose numbers are those of the blocks' first places
         every: stride along x and y among these nodes, starting at the middle: ny along y and nx along x
 
         Computed parity by parity, without the rectangle's matrix, which is four times as large as the quarter's blocks.
         """
-        signs = np.where(column_signs < 0, -1.0, 1.0)
-        (ny, nx), first, last = shape, columns.min(initial=self.blocks.shape[2] - 1), columns.max(initial=0) + 1
-        of_parity = np.zeros((len(PARITIES), max(last - first, 0), loads.shape[1]), dtype=self.blocks.dtype)
-        for total, (p, q) in zip(of_parity, PARITIES, strict=True):
-            np.add.at(total, columns - first, signs[:, :1]**p * signs[:, 1:]**q * loads)
-        rows = self.blocks[:, :ny * nx, first:last].reshape(len(PARITIES), ny, nx, -1)[:, ::every, ::every]
+        (ny, nx), first = shape, int(columns.min(initial=self.blocks.shape[2]))
+        width = max(int(columns.max(initial=0)) + 1 - first, 0)
+        of_parity = np.zeros((len(PARITIES), width, loads.shape[1]), dtype=self.blocks.dtype)
+        for sign in product((1, -1), repeat=2):     # the places of one image differ from each other
+            image = np.flatnonzero((column_signs == sign).all(axis=1))
+            load = loads[image].astype(self.blocks.dtype)
+            for total, (p, q) in zip(of_parity, PARITIES, strict=True):
+                total[columns[image] - first] += sign[0]**p * sign[1]**q * load
+        rows = self.blocks[:, :ny * nx, first:first + width].reshape(len(PARITIES), ny, nx, width)[:, ::every, ::every]
         ee, eo, oe, oo = 0.25 * (rows @ of_parity[:, None])
         even, odd = (np.concatenate([(a - b)[:, :0:-1], a + b], axis=1) for a, b in ((ee, oe), (eo, oo)))
         return np.moveaxis(np.concatenate([(even - odd)[:0:-1], even + odd]), -1, 0)

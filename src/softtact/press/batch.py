@@ -1,8 +1,8 @@
 """Presses of many poses as the arrays of one batch: `press_batch`, and the results of `Sensor.press_many` with the elastic model.
 
-The elastic model presses all of them together, on the processor or on a GPU: undersides, contact, shell, maps, readings, flags and
-expected errors are arrays with a row for each press, and no press is made alone. The foundation model presses them one after the
-other, and so does the elastic model on sensors that its batch does not serve (`together`).
+The elastic model presses all of them together: undersides, maps, readings, flags and expected errors are arrays with a row for each
+press; contacts are solved in turn on the processor, and all at once on a GPU. The foundation model presses one after the other, and
+so does the elastic model on sensors that its batch does not serve (`together`).
 """
 
 import time
@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.contact.undersides import ObjectSurface, PosedUnderside, Target
-from softtact.contact.unilateral import not_settled
+from softtact.contact.undersides import ObjectSurface, PosedUnderside
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, ShellWarning, SofttactError
 from softtact.geometry.pose import Pose
@@ -24,7 +23,7 @@ from softtact.models.elastic.batch import press_layers
 from softtact.models.elastic.compliance import Compliance
 from softtact.press.choice import with_expected_error
 from softtact.press.fast import elastic_result
-from softtact.press.making import RESTS, shell_of
+from softtact.press.making import RESTS, target_of
 from softtact.press.result import PressResult
 from softtact.press.task import checked_forces, cores
 from softtact.press.validity import flag_buried
@@ -32,7 +31,7 @@ from softtact.press.validity import flag_buried
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_AT_ONCE = {"cpu": 128, "cuda": 4096}     # load steps of one problem
+_AT_ONCE = {"cpu": 128, "cuda": 4096}     # load steps
 
 # The arrays of a `PressBatch`, which are those of a `PressResult` with a press in place of a load step.
 _OF_RESULT = ("deformation_map_mm", "thinning_map_mm", "normal_force_n", "pad_force_n", "indentation_mm", "contact_area_mm2",
@@ -136,7 +135,7 @@ def _forces(force_n, count):
 
 
 def together(sensor: "Sensor") -> bool:
-    """Whether the elastic model presses a sensor's batch as one problem: its lower side is held, and all its readouts are ours,
+    """Whether the elastic model presses a sensor's batch together: its lower side is held, and all its readouts are ours,
     which read each load step by itself.
     """
     spec = sensor.spec
@@ -212,8 +211,8 @@ def _pressed_in_turn(sensor, surfaces, poses, forces_n, *, model, device):
 def _pressed_together(sensor, surfaces, poses, forces_n, *, device, model="elastic"):
     """(numbers of presses, their result, with all their load steps in turn) or ([number], its error), in parts."""
     device = find_device(device)
-    compliance, spec = sensor.prepared("elastic"), sensor.spec
-    target = Target(compliance.grid, spec.map_x_mm, spec.map_y_mm, spec.footprint_mm, shell_of(sensor), spec.thickness_mm)
+    compliance = sensor.prepared("elastic")
+    target = target_of(sensor, compliance.grid)
     at_once = max(1, _AT_ONCE["cpu" if device == "cpu" else "cuda"] // forces_n.shape[1])
     for first in range(0, len(surfaces), at_once):
         start, some = time.perf_counter(), range(first, min(first + at_once, len(surfaces)))
@@ -242,12 +241,9 @@ def _undersides(surfaces, poses, some, target, *, threads):
 def _read(sensor, compliance, numbers, objects, forces_n, device, start):
     """(numbers, their result), and the errors of those that did not settle, of presses through forces (p, l)."""
     load_steps = forces_n.shape[1]
-    press = press_layers(compliance, objects, forces_n, device=device)
-    settled = press.contact.settled.reshape(-1, load_steps)
-    for number, steps, forces in zip(numbers, settled, forces_n, strict=True):
-        if not steps.all():
-            yield [number], ConvergenceError(not_settled(forces[~steps][0]))
-    good = np.flatnonzero(settled.all(axis=1))
+    press, errors = press_layers(compliance, objects, forces_n, device=device)
+    yield from (([numbers[k]], error) for k, error in errors.items())
+    good = np.setdiff1d(np.arange(len(numbers)), list(errors))
     if not len(good):
         return
     columns = (good[:, None] * load_steps + np.arange(load_steps)).ravel()

@@ -13,13 +13,14 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
 from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
+from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
-from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
+from softtact.models.elastic.compliance import LayerPress, press_object
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.cache import cached_surface_compliance
-from softtact.press.making import make_result, shell_of, warn_of_shell
+from softtact.press.making import make_result, shell_of, target_of, warn_of_shell
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
 from softtact.press.validity import flagged, flags_elastic, flags_foundation
@@ -50,10 +51,10 @@ def press_underside(sensor: "Sensor", surface: HeightField, forces: np.ndarray, 
     if model == "foundation":
         near = surface.near_touch(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
         return _on_foundation(sensor, near, forces, RunControl(label=""), start)
-    touch = first_touch_mm(sensor, surface)
-    press = _elastic(sensor, surface, forces, touch)
+    compliance, underside = _over(sensor, surface)
+    _, press = press_object(compliance, underside, forces)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
-    return elastic_result(sensor, press, forces, seconds, touch_mm=touch)
+    return elastic_result(sensor, press, forces, seconds, touch_mm=underside.touch_mm)
 
 
 def force_at_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, guess_n: float) -> float:
@@ -61,7 +62,8 @@ def force_at_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, g
 
     surface: the underside of the object;  guess_n: a force nearby
     """
-    return _at_depth(sensor, surface, depth_mm, guess_n)[0]
+    compliance, underside = _over(sensor, surface)
+    return _at_depth(sensor, compliance, underside, depth_mm, guess_n)[0]
 
 
 @dataclass(frozen=True)
@@ -80,23 +82,22 @@ class DepthPress:
 
 def press_to_depth(sensor: "Sensor", surface: HeightField, depth_mm: float, *, guess_n: float) -> DepthPress:
     """The `DepthPress` of an object by its underside, `depth_mm` below first touch; guess_n: a force nearby, in N."""
-    start, compliance = time.perf_counter(), sensor.prepared("elastic")
-    force, points, press = _at_depth(sensor, surface, depth_mm, guess_n)
+    start, (compliance, underside) = time.perf_counter(), _over(sensor, surface)
+    force, points, press = _at_depth(sensor, compliance, underside, depth_mm, guess_n)
     found = np.array([press.contact.force.sum() if press.contact.force.any() else force])
-    result = elastic_result(sensor, press, found, np.array([time.perf_counter() - start]), touch_mm=first_touch_mm(sensor, surface))
+    result = elastic_result(sensor, press, found, np.array([time.perf_counter() - start]), touch_mm=underside.touch_mm)
     pressed = press.contact.force[:, 0] > 0
     return DepthPress(result, compliance.grid.points[points.nodes[pressed]][:, :2], press.contact.force[pressed, 0],
                       press.areas[pressed])
 
 
-def _at_depth(sensor, surface, depth_mm, guess_n):
+def _at_depth(sensor, compliance, underside, depth_mm, guess_n):
     """The force at a depth, and the points and the `LayerPress` of the force that was tried last."""
-    touch = first_touch_mm(sensor, surface)
     low, high = np.log(_LEAST_FORCE * sensor.spec.force_range_n[1]), np.log(sensor.spec.force_range_n[1])
     wanted, force, power, before = np.log(depth_mm), float(np.clip(np.log(guess_n), low, high)), _POWER, None
     for _ in range(_SECANTS):
-        points, press = _elastic_contact(sensor, surface, np.exp([force]), touch)
-        reached = np.log(max(press.contact.depth[-1] - touch, np.finfo(float).tiny))
+        points, press = press_object(compliance, underside, np.exp([force]))
+        reached = np.log(max(press.contact.depth[-1] - underside.touch_mm, np.finfo(float).tiny))
         if abs(reached - wanted) <= _DEPTH_TOLERANCE:
             break
         low, high = (force, high) if reached < wanted else (low, force)
@@ -122,42 +123,16 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
         raise InputError(f"{sensor.spec.name} is a gel with far sides, of which no maps over force are kept; press it by motions.")
     if model == "foundation":
         return press_underside(sensor, surface, forces_n, model=model).deformation_map_mm
-    press = _elastic(sensor, surface, forces_n, first_touch_mm(sensor, surface), patches=True)
+    compliance, underside = _over(sensor, surface)
+    _, press = press_object(compliance, underside, forces_n, patches=True)
     warn_of_shell(sensor.spec, forces_n, _snapped(forces_n, press.contact.force.sum(axis=0)))
     return felt_displacement(sensor.spec, press.thinning)
 
 
-def _elastic(sensor, surface, forces, touch, *, patches=False):
-    """The `LayerPress` of an object by its underside; touch: descent to first touch."""
-    return _elastic_contact(sensor, surface, forces, touch, patches=patches)[1]
-
-
-def _elastic_contact(sensor, surface, forces, touch, *, patches=False):
-    """The `ObjectPoints` and the `LayerPress` of an object by its underside."""
+def _over(sensor, surface):
+    """The sensor's compliance, and the `PosedUnderside` of an object over its grid."""
     compliance = sensor.prepared("elastic")
-    underside, stop = Underside(surface, compliance.grid), shell_stop_mm(sensor, surface)
-
-    def solve(points):
-        if (alone := _above_shell(lambda: press_layer(compliance, points, forces, patches=patches), stop)) is not None:
-            return alone
-        on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
-                            depth_of=lambda force: press_layer(compliance, points, [force], patches=patches).contact.depth[0])
-        return (press_layer(compliance, points, on_pad, patches=patches) if on_pad.any()
-                else rest_on_shell(compliance, points, len(forces), stop))
-
-    first = RISE * underside.depth_on_springs(forces[-1], compliance.foundation_modulus)
-    return _of_candidates(underside, underside.nodes, first, sensor.spec.deepest_mm, solve, lambda press: press.contact.depth[-1])
-
-
-def _above_shell(press, stop_mm):
-    """The result of `press` with all forces on the pad, if the object stays above the shell; else None."""
-    try:
-        found = press()
-    except ConvergenceError:     # a force that the pad cannot carry alone
-        if np.isinf(stop_mm):
-            raise
-        return None
-    return found if found.contact.depth[-1] <= stop_mm else None
+    return compliance, underside_of(surface.triangles, target_of(sensor, compliance.grid))
 
 
 def first_touch_mm(sensor: "Sensor", surface: HeightField) -> float:

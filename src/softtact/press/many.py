@@ -23,7 +23,7 @@ from softtact.progress import progress
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_COLUMNS = 32     # load steps of one problem in a process; a fixed number, so that results do not depend on the processes
+_COLUMNS = 32     # load steps at once in a process; a fixed number, so that results do not depend on the processes
 _PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": ("foundation",)}
 
 

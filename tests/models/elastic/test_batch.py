@@ -1,5 +1,5 @@
-"""The elastic surface of a batch, in NumPy's arrays and in torch's: its products are those of the compliance's own matrix, and a
-batch's contact is that of each press alone."""
+"""Batches of the elastic model, one press after the other and as on a GPU: a batch's contact is that of each press alone, and the
+products of the GPU's surface are those of the compliance's own matrix."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,15 @@ from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.underside import Underside
 from softtact.contact.undersides import PosedUnderside
 from softtact.contact.unilateral import active_set
+from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.models.elastic.batch import BatchSettings, BatchSurface, press_layers
+from softtact.models.elastic import batch
+from softtact.models.elastic.batch import BatchSettings, BatchSurface
 from softtact.models.elastic.compliance import elastic_compliance
 
-DEVICES = ["cpu", torch.device("cpu")]      # NumPy's arrays, and torch's, as on a GPU
+DEVICES = ["cpu", torch.device("cpu")]      # one after the other, and as on a GPU
+GPU = torch.device("cpu")
 FORCES = np.array([0.5, 3.0])
 
 
@@ -35,10 +38,9 @@ def dense(compliance, nodes):
     return compliance.blocks.between(*places, *places).astype(float)
 
 
-@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("smaller", [0, 2])
-def test_displacements_are_those_of_the_dense_compliance(compliance, device, smaller):
-    surface = BatchSurface(compliance, device, tuple(count - smaller for count in whole(compliance.grid)))
+def test_displacements_are_those_of_the_dense_compliance(compliance, smaller):
+    surface = BatchSurface(compliance, GPU, tuple(count - smaller for count in whole(compliance.grid)))
     force = np.random.default_rng(1).standard_normal((len(surface.nodes), 3)) * surface.real[:, None]
     single = surface.put(force.astype(np.float32))
     everywhere = np.zeros((compliance.grid.count, 3))
@@ -51,14 +53,20 @@ def test_displacements_are_those_of_the_dense_compliance(compliance, device, sma
         np.testing.assert_allclose(found, expected[:, surface.nodes[surface.real]], rtol=0, atol=error * scale)
 
 
-@pytest.mark.parametrize("device", DEVICES)
-def test_the_preconditioner_is_the_compliances_stencil(compliance, device):
-    surface = BatchSurface(compliance, device, whole(compliance.grid))
+def test_the_preconditioner_is_the_compliances_stencil(compliance):
+    surface = BatchSurface(compliance, GPU, whole(compliance.grid))
     force = np.random.default_rng(1).standard_normal((len(surface.nodes), 3)).astype(np.float32) * surface.real[:, None]
     nodes = surface.nodes[surface.real]
     expected = compliance.stencil.on(compliance.grid, nodes)(force[surface.real])
     found = np.asarray(surface.precondition(surface.put(force.astype(np.float32))))[surface.real]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def press_layers(compliance, objects, forces, **options):
+    """The `LayerPress` of a batch in which all presses settle."""
+    press, errors = batch.press_layers(compliance, objects, forces, **options)
+    assert not errors and press.contact.settled.all()
+    return press
 
 
 def over(compliance, mesh, pose, *, stop_mm=np.inf):
@@ -81,7 +89,6 @@ def objects_over(compliance):
 def test_a_batch_has_the_contact_of_the_active_set_of_each_press(compliance, device):
     objects = objects_over(compliance)
     press = press_layers(compliance, objects, np.tile(FORCES, (len(objects), 1)), device=device)
-    assert press.contact.settled.all()
     for number, one in enumerate(objects):
         nodes = np.flatnonzero(one.height_mm < NO_CONTACT_MM)
         for step, plain in enumerate(active_set(dense(compliance, nodes), one.height_mm[nodes], FORCES)):
@@ -94,10 +101,11 @@ def test_a_batch_has_the_contact_of_the_active_set_of_each_press(compliance, dev
 
 def test_objects_that_sink_deeper_than_on_springs_touch_beyond_the_nodes_that_were_near(compliance, monkeypatch):
     objects, forces = objects_over(compliance)[:1], np.full((1, 1), 3.0)
-    expected = press_layers(compliance, objects, forces)
+    expected = press_layers(compliance, objects, forces, device=GPU)
     for name, value in (("_NEAR", 0.0), ("LEAST_REACH_MM", 0.01), ("_SIDES", 50)):
         monkeypatch.setattr(f"softtact.models.elastic.batch.{name}", value)
-    np.testing.assert_allclose(press_layers(compliance, objects, forces).fields, expected.fields, rtol=0, atol=2e-6)     # mm
+    found = press_layers(compliance, objects, forces, device=GPU)
+    np.testing.assert_allclose(found.fields, expected.fields, rtol=0, atol=2e-6)     # mm
 
 
 @pytest.mark.parametrize("device", DEVICES)
@@ -111,13 +119,32 @@ def test_an_object_that_rests_on_the_shell_is_held_there_beside_presses_that_do_
     np.testing.assert_allclose(both.depth, alone.depth[[0, 2, 0, 1]], rtol=0, atol=1e-6)
 
 
-def test_an_object_on_the_shell_before_it_touches_leaves_the_layer_at_rest(compliance):
+@pytest.mark.parametrize("device", DEVICES)
+def test_an_object_on_the_shell_before_it_touches_leaves_the_layer_at_rest(compliance, device):
     ball = over(compliance, trimesh.creation.icosphere(radius=4.0), (0, 0, 4, 0, 0, 0))
-    press = press_layers(compliance, [PosedUnderside(ball.height_mm, ball.touch_mm, ball.touch_mm - 0.1, 5.0)], np.array([[3.0]]))
-    assert press.contact.settled.all() and not press.fields.any() and press.contact.depth[0] == ball.touch_mm - 0.1
+    resting = PosedUnderside(ball.height_mm, ball.touch_mm, ball.touch_mm - 0.1, 5.0)
+    press = press_layers(compliance, [resting], np.array([[3.0]]), device=device)
+    assert not press.fields.any() and press.contact.depth[0] == ball.touch_mm - 0.1
 
 
-def test_a_press_that_does_not_settle_is_marked_and_leaves_the_others(compliance):
+def test_a_press_that_does_not_settle_has_an_error_and_leaves_the_others(compliance):
     objects = objects_over(compliance)
-    settled = press_layers(compliance, objects, np.full((3, 1), 3.0), settings=BatchSettings(max_iterations=3)).contact.settled
-    assert not settled.all()
+    press, errors = batch.press_layers(compliance, objects, np.full((3, 1), 3.0), device=GPU,
+                                       settings=BatchSettings(max_iterations=3))
+    assert errors and all("at 3 N" in str(error) for error in errors.values())
+    assert list(errors) == list(np.flatnonzero(~press.contact.settled))
+
+
+def test_on_the_processor_the_error_of_one_press_leaves_the_others_as_they_are(compliance, monkeypatch):
+    objects, forces, touch = objects_over(compliance), np.tile(FORCES, (3, 1)), batch.touch_object
+    expected = press_layers(compliance, objects, forces)
+
+    def touch_or_fail(layer, one, forces_n):
+        if one is objects[1]:
+            raise ConvergenceError("not at 3 N")
+        return touch(layer, one, forces_n)
+
+    monkeypatch.setattr(batch, "touch_object", touch_or_fail)
+    press, errors = batch.press_layers(compliance, objects, forces)
+    assert list(errors) == [1] and str(errors[1]) == "not at 3 N" and not press.fields[2:4].any()
+    np.testing.assert_allclose(press.fields[[0, 1, 4, 5]], expected.fields[[0, 1, 4, 5]], rtol=0, atol=1e-6)

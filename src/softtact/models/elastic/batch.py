@@ -1,8 +1,11 @@
-"""Many presses of the elastic model at once: a column for each press and load step, in NumPy's arrays or in torch's on any device.
+"""Many presses of the elastic model: one after the other on the processor, all at once on a GPU.
 
-`press_layer` gathers a dense compliance among one object's points, which takes longer to read than to multiply with. Here all
-presses share the surface, free sides included: a product uses four dense matrices, one for each parity, on a quarter of the
-surface's nodes and all columns. Only the quarter's rectangle of nodes that the objects come near takes part.
+On the processor each object has its dense compliance among its points (`compliance.touch_object`), which caches hold; the fields of
+all presses are one product, which reads the surface's compliance once.
+
+On a GPU there is a column for each press and load step, and all share the surface, free sides included: a product uses four dense
+matrices, one for each parity, on a quarter of the surface's nodes and all columns. Only the quarter's rectangle of nodes that the
+objects come near takes part.
 The method is that of `contact.unilateral`: points that penetrate join the active set, points in tension leave it, and the equations
 on a set are solved by projected conjugate gradients. A set is left as soon as its residual has fallen by a power of ten, and the
 displacement is updated by products with changes of the forces alone, so single precision serves. An object that would sink below
@@ -18,10 +21,11 @@ import numpy as np
 from array_api_compat import array_namespace, device
 
 from softtact.contact.height_field import NO_CONTACT_MM
-from softtact.contact.node_grid import apply_stencil
+from softtact.contact.object_points import ObjectPoints
 from softtact.contact.undersides import PosedUnderside
-from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps, depth_on_springs
-from softtact.models.elastic.compliance import Compliance, LayerPress
+from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps, depth_on_springs, not_settled
+from softtact.errors import ConvergenceError
+from softtact.models.elastic.compliance import Compliance, LayerPress, touch_object
 from softtact.models.quarter_symmetry import PARITIES
 
 _FALL = 0.1             # of a residual, before the active set is renewed
@@ -44,20 +48,20 @@ class BatchSettings:
 
 
 class BatchSurface:
-    """A `Compliance` on a device, among the nodes of a rectangle about the middle: `displacement` and `precondition`.
+    """A `Compliance` on a device of torch, among the nodes of a rectangle about the middle: `displacement` and `precondition`.
 
     Values (4 u, columns) are those of the u nodes of the rectangle's quarter, then of their mirror images along y, along x, and
     both. Nodes on an axis are their own images; there the image's place is not `real`.
     """
 
     def __init__(self, compliance: Compliance, device: Any, quarter: tuple[int, int]) -> None:
-        """device: `cpu` for NumPy's arrays, else a device of torch;  quarter: rows and columns of the rectangle's quarter"""
+        """quarter: rows and columns of the rectangle's quarter"""
         self.grid, (rows, columns) = compliance.grid, quarter
         whole = tuple(count // 2 + 1 for count in self.grid.shape)
         self._numbers = np.arange(whole[0] * whole[1]).reshape(whole)[:rows, :columns].ravel()
         self._all_nodes, _ = _images(self.grid, *np.divmod(np.arange(whole[0] * whole[1]), whole[1]))
         self.nodes, self.real = _images(self.grid, *np.divmod(self._numbers, whole[1]))
-        self._device = None if device == "cpu" else device
+        self._device = device
         neighbours, weights = _neighbours(compliance, self.nodes, self.real)
         self._neighbours, self._weights = self.put(neighbours), self.put(weights)
         self._blocks = self.put(compliance.blocks.blocks)
@@ -66,8 +70,6 @@ class BatchSurface:
 
     def put(self, values: np.ndarray) -> Any:
         """An array on the device."""
-        if self._device is None:
-            return values
         import torch  # takes seconds
 
         return torch.as_tensor(values, device=self._device)
@@ -108,8 +110,6 @@ class BatchSurface:
 
     def precondition(self, x: Any) -> Any:
         """Approximate inverse of `displacement`: the compliance's stencil."""
-        if self._device is None:
-            return apply_stencil(x, self._neighbours, self._weights)
         out = self._weights[:, :1] * x[self._neighbours[:, 0]]
         for number in range(1, self._neighbours.shape[1]):
             out.addcmul_(self._weights[:, number, None], x[self._neighbours[:, number]])
@@ -155,19 +155,44 @@ def _surface_of(compliance, device, quarter):
 
 
 def _on_host(values):
-    return values if isinstance(values, np.ndarray) else values.cpu().numpy()
+    return values.cpu().numpy()
 
 
 def press_layers(compliance: Compliance, objects: list[PosedUnderside], forces_n: np.ndarray, *, device: Any = "cpu",
-                 settings: BatchSettings = BatchSettings()) -> LayerPress:
-    """The `LayerPress` of objects through forces (p, l) in N, rising, whose columns are the objects' load steps, side by side.
+                 settings: BatchSettings = BatchSettings()) -> tuple[LayerPress, dict[int, ConvergenceError]]:
+    """The `LayerPress` of objects through forces (p, l) in N, rising, whose columns are the objects' load steps, side by side; and
+    the errors of those that do not settle, by their number.
 
-    device: `cpu`, or a device of torch. A load step that does not settle is marked by the contact's `settled`.
+    device: `cpu`, or a device of torch, for which the settings are
     """
+    if device == "cpu":
+        return _press_in_turn(compliance, objects, forces_n)
     load_steps = forces_n.shape[1]
     heights = np.repeat([one.height_mm for one in objects], load_steps, axis=0)
     stops = np.repeat([one.stop_mm for one in objects], load_steps)
-    return _press_columns(compliance, heights, forces_n.ravel(), stops, device, settings)
+    press = _press_columns(compliance, heights, forces_n.ravel(), stops, device, settings)
+    settled = press.contact.settled.reshape(-1, load_steps)
+    return press, {int(number): ConvergenceError(not_settled(forces_n[number][~settled[number]][0]))
+                   for number in np.flatnonzero(~settled.all(axis=1))}
+
+
+def _press_in_turn(compliance, objects, forces_n):
+    """`press_layers` on the processor."""
+    grid, (presses, load_steps), errors = compliance.grid, forces_n.shape, {}
+    force, gap = np.zeros((grid.count, forces_n.size)), np.full((grid.count, forces_n.size), np.inf)
+    depth, iterations, settled = (np.zeros(forces_n.size, dtype=kind) for kind in (float, int, bool))
+    for number in range(presses):
+        columns = slice(number * load_steps, (number + 1) * load_steps)
+        try:
+            points, contact = touch_object(compliance, objects[number], forces_n[number])
+        except ConvergenceError as error:
+            errors[number] = error.with_traceback(None)
+            continue
+        force[points.nodes, columns], gap[points.nodes, columns] = contact.force, contact.gap
+        depth[columns], iterations[columns], settled[columns] = contact.depth, contact.iterations, True
+    pressed = np.flatnonzero(force.any(axis=1))
+    fields = compliance.fields(ObjectPoints.level(pressed, np.zeros(len(pressed)), grid.step), force[pressed])
+    return LayerPress(fields, ContactLoadSteps(force, depth, gap, iterations, settled), grid.areas(np.arange(grid.count))), errors
 
 
 def _press_columns(compliance, heights, forces_n, stops, device, settings):
@@ -212,7 +237,7 @@ def _among(compliance, quarter, heights, forces_n, stops, first, device, setting
     press = _Columns(surface, surface.put(gap0), surface.put(forces_n), settings)
     xp = press.xp
     press.start(surface.put(first), surface.put(areas))
-    press.settle(xp.arange(len(forces_n)) if device == "cpu" else surface.put(np.arange(len(forces_n))))
+    press.settle(surface.put(np.arange(len(forces_n))))
     resting = (_on_host(press.depth) > stops) | (~_on_host(press.settled) & np.isfinite(stops))
     if resting.any():
         press.hold(surface.put(np.flatnonzero(resting)), surface.put(stops[resting]))

@@ -7,15 +7,20 @@ The vertical compliance of the top's nodes (mm/N) is computed once for a sensor 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from softtact.contact.lower_envelope import NO_CONTACT_MM
 from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
 from softtact.contact.object_points import ObjectPoints
-from softtact.contact.unilateral import ContactLoadSteps, press_elastic
+from softtact.contact.shell import pad_forces
+from softtact.contact.undersides import PosedUnderside
+from softtact.contact.unilateral import REACH, RISE, ContactLoadSteps, depth_on_springs, press_elastic
+from softtact.errors import ConvergenceError
 from softtact.files import read_arrays
 from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, of_parities
 from softtact.sensors.base import BaseSpec
@@ -251,31 +256,77 @@ class LayerPress:
 
 def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence[float] | np.ndarray, *,
                 patches: bool = False) -> LayerPress:
-    """Press `ObjectPoints` of the compliance's grid with forces (l,) in N.
+    """Press `ObjectPoints` of the compliance's grid with forces (l,) in N; patches: as for `press_object`."""
+    return _with_fields(compliance, points, _contact_among(compliance, points, patches)(forces_n))
+
+
+def press_object(compliance: Compliance, underside: PosedUnderside, forces_n: np.ndarray, *,
+                 patches: bool = False) -> tuple[ObjectPoints, LayerPress]:
+    """The `LayerPress` of an object that comes down through rising forces (l,) in N, at most to the shell, and its points.
 
     patches: let four level points inside a large contact share a pressure (`patches_of`): two thirds of the time, readings within
-    0.1 %
+    0.1 %. Raises ConvergenceError.
     """
-    areas, stencil = compliance.grid.areas(points.nodes), compliance.stencil.on(compliance.grid, points.nodes)
+    points, contact = touch_object(compliance, underside, forces_n, patches=patches)
+    return points, _with_fields(compliance, points, contact)
+
+
+def touch_object(compliance: Compliance, underside: PosedUnderside, forces_n: np.ndarray, *,
+                 patches: bool = False) -> tuple[ObjectPoints, ContactLoadSteps]:
+    """The contact of `press_object` and its points.
+
+    The layer is stiffer than springs side by side, so points within the reach of these are enough; if the object gets deeper all
+    the same, more points are taken. Beside the object the surface rises, so points slightly above the depth can touch, too.
+    """
+    grid, height = compliance.grid, underside.height_mm
+    lowest, there = min(underside.touch_mm, float(height.min())), int((height < NO_CONTACT_MM).sum())
+    on_springs = depth_on_springs(height, grid.areas(np.arange(grid.count)), forces_n[-1] / compliance.foundation_modulus)
+    reach = RISE * (on_springs - lowest)
+    while True:
+        nodes = np.flatnonzero((height <= lowest + reach) & (height < NO_CONTACT_MM))
+        points = ObjectPoints.level(nodes, height[nodes], grid.step)
+        contact = _on_pad(_contact_among(compliance, points, patches), points, forces_n, underside)
+        if len(nodes) == there or RISE * (contact.depth[-1] - lowest) <= reach:
+            return points, contact
+        reach *= REACH
+
+
+def _on_pad(press, points, forces_n, underside):
+    """The `ContactLoadSteps` of `press` under forces (l,) on the object, of which the pad carries what the shell does not."""
+    try:
+        contact = press(forces_n)
+        if contact.depth[-1] <= underside.stop_mm:
+            return contact
+    except ConvergenceError:     # a force that the pad cannot carry alone
+        if np.isinf(underside.stop_mm):
+            raise
+    on_pad = pad_forces(forces_n, stop_mm=underside.stop_mm, touch_mm=underside.touch_mm,
+                        depth_of=lambda force: press([force]).depth[0])
+    if on_pad.any():
+        return press(on_pad)
+    gap = np.tile((points.gap - underside.stop_mm)[:, None], len(forces_n))     # it rests on the shell: the layer is undeformed
+    return ContactLoadSteps(force=np.zeros_like(gap), depth=np.full(len(forces_n), underside.stop_mm), gap=gap,
+                            iterations=np.zeros(len(forces_n), dtype=int), settled=np.ones(len(forces_n), dtype=bool))
+
+
+def _contact_among(compliance, points, patches):
+    """The `ContactLoadSteps` of points as a function of forces (l,) in N on them."""
+    area, stencil = points.covered * compliance.grid.areas(points.nodes), compliance.stencil.on(compliance.grid, points.nodes)
+    among, modulus = compliance.among(points), compliance.foundation_modulus
     share = patches_of(points, compliance.grid, True, beside_edge=_SINGLE) if patches else None
     if share is None or share.shape[0] == points.count:
-        contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * areas,
-                                foundation_modulus=compliance.foundation_modulus, precondition=stencil)
-    else:
-        own, single = (share > 0).astype(np.float32), share.astype(np.float32)
-        among = single @ np.ascontiguousarray((single @ compliance.among(points)).T)
-        contact = press_elastic(among, share @ points.gap, forces_n, area=own @ (points.covered * areas),
-                                foundation_modulus=compliance.foundation_modulus,
+        return partial(press_elastic, among, points.gap, area=area, foundation_modulus=modulus, precondition=stencil)
+    own, single = (share > 0).astype(np.float32), share.astype(np.float32)
+    among = single @ np.ascontiguousarray((single @ among).T)
+
+    def press(forces_n):
+        contact = press_elastic(among, share @ points.gap, forces_n, area=own @ area, foundation_modulus=modulus,
                                 precondition=lambda x: own @ stencil(own.T @ x))
-        contact = replace(contact, force=share.T @ contact.force, gap=own.T @ contact.gap)
-    return LayerPress(fields=compliance.fields(points, contact.force), contact=contact, areas=areas,
-                      lower_fields=compliance.lower_fields(points, contact.force))
+        return replace(contact, force=share.T @ contact.force, gap=own.T @ contact.gap)
+
+    return press
 
 
-def rest_on_shell(compliance: Compliance, points: ObjectPoints, count: int, depth_mm: float) -> LayerPress:
-    """The `LayerPress` of `count` load steps of an object that rests on the shell: the layer is undeformed."""
-    gap = np.tile((points.gap - depth_mm)[:, None], count)
-    contact = ContactLoadSteps(force=np.zeros_like(gap), depth=np.full(count, depth_mm), gap=gap,
-                               iterations=np.zeros(count, dtype=int), settled=np.ones(count, dtype=bool))
+def _with_fields(compliance, points, contact):
     return LayerPress(fields=compliance.fields(points, contact.force), contact=contact, areas=compliance.grid.areas(points.nodes),
                       lower_fields=compliance.lower_fields(points, contact.force))
