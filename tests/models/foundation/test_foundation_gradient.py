@@ -17,6 +17,7 @@ from softtact.press.sensor import Sensor
 
 FORCE, POSE = 6.0, (0.3, -0.4, 0.0, 4.0, -3.0, 20.0)
 FIELDS = ("force", "q", "depth", "loads", "lateral", "rise", "shift")
+CASES = [((3.5, 3.5), 2.0, False), ((2.5, -2.5), 4.0, True)]     # place, force, and whether the frustum nearest to a change stands
 TOLERANCE = 1e-5     # in the norm of each kind of unknown
 
 
@@ -80,6 +81,24 @@ def test_the_active_sets_stay_within_the_margin_and_change_beyond_it(pressed, ta
 
     now = np.concatenate([tangent.balance.contact.touching, tangent.balance.contact.standing])
     assert all((one == now).all() for one in sets(0.9)) and any((one != now).any() for one in sets(1.1))
+
+
+@pytest.mark.parametrize(("place", "force_n", "stands"), CASES)
+def test_the_margin_ends_where_a_frustum_leaves_or_meets_the_sheet_too(compliance, place, force_n, stands):
+    """Without the patches: the distance of each frustum from its other state, over the speed of balances nearby."""
+    points, step = points_of(ellipsoid(), compliance, (*place, *POSE[2:])), 1e-5
+    start = next(settled_contacts(compliance, points, [force_n]))
+    tangent, upper, lower = (Tangent.settled(Balance(compliance, points, start), start.points.gap, force_n + by)
+                             for by in (0.0, step, -step))
+    contact = tangent.balance.contact
+
+    def distance(of):
+        return np.where(contact.standing, of.at.q, -of._down.ravel() - of.at.rise)
+
+    ahead = distance(tangent) / (np.abs(distance(upper) - distance(lower)) / (2 * step))
+    frusta = Tangent(tangent.balance.of(replace(contact, possible=np.zeros_like(contact.possible))), tangent.at)
+    assert contact.standing[ahead.argmin()] == stands
+    assert frusta.by_force().margin == pytest.approx(ahead.min(), rel=1e-3)
 
 
 def stiffer(compliance, factor):
