@@ -45,6 +45,14 @@ def test_a_press_that_fails_is_named_after_the_others_are_done_or_kept_in_its_pl
     assert first.converged.all() and isinstance(second, InputError)
 
 
+@pytest.mark.parametrize(("model", "said"), [("hyperelastic", "grips: a press by the hyperelastic model takes about "),
+                                             ("elastic", "")])
+def test_a_long_model_states_its_time_before_the_first_press(sensor, model, said, capsys):
+    sensor.press_many(MESHES[0], [BESIDE], force_n=1.0, model=model, workers=1, failures="keep", label="grips")
+    told = capsys.readouterr().err
+    assert told.startswith(said) and ("two idle cores" in told) == bool(said)
+
+
 # --- as a stage of the workflow ---
 
 

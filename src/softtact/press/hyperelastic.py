@@ -44,7 +44,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
     body = sensor.body(threads=control.threads, surface=_swept(surface, forces))
     if control.label:
         steps = f"{count} load step{'s' * (count > 1)}"
-        announce(f"{control.label}: {sensor.spec.parts_in_words}, {steps} of the hyperelastic model{_time_in_words(sensor, count)}")
+        announce(f"{control.label}: {sensor.spec.parts_in_words}, {steps} of the hyperelastic model{time_in_words(sensor, count)}")
     body.watch = Watch(control.label, limit_s=control.time_limit_s)
     record = _Record(sensor, body, touch, control)
     load_steps = map(record.take, _allowed(_load_steps(sensor, body, surface, forces, touch), sensor, surface, forces, touch))
@@ -56,7 +56,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
         body.close()
 
 
-def _time_in_words(sensor, count):
+def time_in_words(sensor: "Sensor", count: int) -> str:
     """How long a press with the default mesh takes on two idle cores, after docs/performance.md; nothing without frusta."""
     if np.isnan(sensor.spec.frustum_height_mm):
         return ""

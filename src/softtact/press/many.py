@@ -18,7 +18,7 @@ from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
 from softtact.press.task import cores
 from softtact.processes import map_in_processes
-from softtact.progress import progress
+from softtact.progress import announce, progress
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -74,8 +74,19 @@ def _pressed_all(sensor, jobs, batch):
         prepared = models_to_prepare(sensor, policy=batch.options.get("policy", "error"))
     for name in prepared:
         sensor.prepared(name)
+    if batch.label and model in ("auto", "hyperelastic"):
+        _announce_time(sensor, batch)
     act = partial(_pressed, force_n=batch.force_n, model=model, options=batch.options)
     return list(progress(_each(sensor, act, jobs, batch.workers), label=batch.label, total=len(jobs)))
+
+
+def _announce_time(sensor, batch):
+    """State how long a press by the hyperelastic model takes, before one may begin."""
+    from softtact.press.hyperelastic import time_in_words
+
+    if sensor.spec.has_layers and (time := time_in_words(sensor, len(batch.force_n))):
+        announce(f"{batch.label}: a press by the hyperelastic model{', where it is chosen,' if batch.model == 'auto' else ''} takes"
+                 f"{time.removeprefix(':')}")
 
 
 def _pressed_together(sensor, jobs, batch, *, device):
