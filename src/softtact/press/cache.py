@@ -27,7 +27,7 @@ from softtact.sensors.specification import AnySpec
 SHIPPED = Path(str(resources.files("softtact.press"))) / "data"
 _POINTS = 1881  # of the paper's map
 _FOUNDATION_TAKES = 30, 1.5     # seconds for the paper's map, which grow with this power of the number of a map's points
-_ELASTIC_TAKES = 14, 2.0     # the same of the elastic model, on one core
+_ELASTIC_TAKES = 6, 2.0     # the same of the elastic model, on one core
 _FRUSTUM_TAKES = 20     # seconds
 _FORMAT = 12    # of the files; a new number computes them again
 

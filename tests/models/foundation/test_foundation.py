@@ -221,7 +221,7 @@ def test_a_press_whose_steps_share_factors_gives_the_map_of_steps_with_their_own
 @pytest.mark.filterwarnings("error")
 def test_a_load_step_whose_patches_have_all_let_go_is_not_reached_and_nothing_is_divided_by_zero(compliance):
     press = _Press(compliance, points_of(BOX, compliance), FoundationSettings())
-    state = press.first()
+    state = press.first(1.0)
     assert state.touching.any()
     state.touching[:] = False
     assert press.load_step(state, 1.0) == (None, 1)

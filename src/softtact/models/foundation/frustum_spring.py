@@ -173,6 +173,10 @@ class FrustumLaw:
         """
         return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
 
+    def rocking_compliance(self, rise: np.ndarray) -> np.ndarray:
+        """By how much `rise` falls with the force, in mm/N, where it is positive, else 0."""
+        return np.where(rise > 0, self.tip_radius_mm**2 / self.upright, 0.0)
+
     def rise_rate(self, sideways: np.ndarray, force: np.ndarray, sideways_rate: np.ndarray, force_rate: np.ndarray) -> np.ndarray:
         """Rate of `rise` from those of its arguments."""
         rate = self.tip_radius_mm * (self.lean * sideways_rate - self.tip_radius_mm * force_rate / self.upright)

@@ -38,17 +38,17 @@ import scipy.linalg as sla
 
 from softtact.contact.node_grid import patches_of
 from softtact.contact.object_points import ObjectPoints
+from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import ConvergenceError
 from softtact.models.foundation.active_system import ActiveSystem
 from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges
 
 _STEP = 0.01         # of a force, for a difference quotient
-_SLOWLY = 5.0        # factor of stricter convergence where updates are relaxed by half
 _WITHIN = 0.005      # of the tolerance: error of the forces that a step's linear system is solved to
 _REPEATS = 6         # updates of the covered shares after convergence of the forces; the last one relaxed by half
 _STRAYED = 0.03      # of a grid step, and of the depth: movements of points and object that require an update of covered shares
-_PATIENCE = 8        # iterations after which updates of oscillating loads are relaxed by half
+_PATIENCE = 14       # iterations after which updates of oscillating loads are relaxed by half
 _ABSURD_MM = 1e6     # depth at which an iteration counts as diverged; with few active points it may reach metres
 _ROUGHLY = 100       # factor of the tolerance for intermediate forces between load steps
 _FIRST_PATCHES = 30
@@ -86,9 +86,9 @@ class Effects:
     moved: np.ndarray
     rise: np.ndarray
 
-    def towards(self, other: "Effects", share: float, *, loads: np.ndarray | float, rise: float) -> "Effects":
-        """Relaxation towards other effects by a share of the difference, with separate shares for loads and rise."""
-        shares = (loads, share, 1.0, rise)
+    def towards(self, other: "Effects", share: float, *, loads: np.ndarray | float) -> "Effects":
+        """Relaxation towards other effects by a share of the difference, with a separate share for loads."""
+        shares = (loads, share, 1.0, share)
         return Effects(*(a + part * (b - a) for a, b, part in zip(astuple(self), astuple(other), shares, strict=True)))
 
     def continued(self, before: "Effects", share: float) -> "Effects":
@@ -126,8 +126,7 @@ class FiniteDisplacement:
                 share: float) -> tuple[Effects, float]:
         """The effects under a load, with descents `down` (b,) of the frusta under their law's forces q (b,), relaxed by `share`.
 
-        The rise is relaxed by half, as full updates would oscillate: a force ends the rocking that causes it. Returns the effects
-        and their remaining change, as the largest change of a frustum's force in N.
+        Returns the effects and their remaining change, as the largest change of a frustum's force in N.
         """
         found, missing, load = effects, 0.0, load.astype(np.float32)
         roots: Any = self._roots(effects, load) if self.settings.follow or self.settings.rocking else None
@@ -137,8 +136,8 @@ class FiniteDisplacement:
         if self.settings.rocking:
             rise = self.law.rise(np.hypot(*roots[:, :, 0].T), q)
             found = Effects(found.loads, found.lateral, found.moved, rise)
-            missing = max(missing, _SLOWLY * (np.abs(rise - effects.rise) / self.law.slope(q)).max())
-        return effects.towards(found, share, loads=share * self._pace(q, roots), rise=0.5), float(missing)
+            missing = max(missing, (np.abs(rise - effects.rise) / self.law.slope(q)).max())
+        return effects.towards(found, share, loads=share * self._pace(q, roots)), float(missing)
 
     def _pace(self, q, roots):
         """Relaxation factors (b,) of the loads: additional forces on a frustum reduce the force of its law, and full updates would
@@ -255,8 +254,9 @@ def settled_contacts(compliance: FoundationCompliance, points: ObjectPoints, for
                      settings: FoundationSettings = FoundationSettings()) -> Iterator[SettledContact]:
     """Yield a `SettledContact` for each force, as `press_foundation` its load step."""
     press = _Press(compliance, points, settings)
-    path = [(0.0, press.first())]
+    path: list[tuple[float, _State]] = []
     for force in forces_n:
+        path = path or [(0.0, press.first(float(force)))]
         load_step = _advance(press, path, float(force))
         state = path[-1][1]
         yield SettledContact(load_step, state.touching, state.standing, state.q, state.effects, press.patch,
@@ -335,6 +335,7 @@ class _Press:
     def __init__(self, compliance, points, settings):
         self.law, self.points, self.settings = compliance.law, points, settings
         self.touched = points     # as of the last update of the contact
+        self._springs = compliance.grid.areas(points.nodes) * compliance.foundation_modulus
         places = Places(compliance, points)
         self.frusta = len(places.frusta)
         self.patch = patches_of(points, compliance.grid, settings.patches)
@@ -342,11 +343,13 @@ class _Press:
         self.possible, self.system = np.ones(self.patch.shape[0], dtype=bool), ActiveSystem(self.slab.matrix, self.patch.shape[0])
         self.finite = FiniteDisplacement(compliance, points, places, settings)
 
-    def first(self):
-        """The start of a press: the lowest patches touch."""
+    def first(self, force):
+        """The start of a press: the patches touch that are lower than the object would come on springs, and the lowest ones."""
         gap = self.patch @ self.points.gap
-        return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), np.zeros(self.frusta),
-                      self.finite.none(), np.zeros(len(self.slab.matrix)), 0.0)
+        depth = depth_on_springs(self.points.gap - gap.min(), self._springs, force)
+        touching = gap <= max(gap.min() + depth, np.sort(gap)[:_FIRST_PATCHES][-1])
+        return _State(touching, np.ones(self.frusta, dtype=bool), np.zeros(self.frusta), self.finite.none(),
+                      np.zeros(len(self.slab.matrix)), 0.0)
 
     def load_step(self, state, force, *, rough=False):
         """Newton's method from a state, which is updated to the load step; returns it, or None on failure, and the iterations.
@@ -412,9 +415,9 @@ class _Press:
         """
         c, law, slab, slope = len(gap0), self.law, self.slab, self.law.slope(state.q)
         rows = np.flatnonzero(np.concatenate([state.touching, state.standing]))
-        spring = np.concatenate([slab.contact_compliance, slope])
+        spring = np.concatenate([slab.contact_compliance, slope + law.rocking_compliance(state.effects.rise)])
         already = already + slab.matrix[:, c:] @ state.effects.loads.astype(np.float32)
-        reached = slope * state.q - law.extension(state.q) + state.effects.rise
+        reached = spring[c:] * state.q - law.extension(state.q) + state.effects.rise
         right = np.concatenate([-gap0, reached]) - already
         state.solved, moved, depth = self.system.solve(rows, spring, right, state.solved, force, enough)
         return moved + already, depth
