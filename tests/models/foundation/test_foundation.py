@@ -14,7 +14,14 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.models.foundation import active_system
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges, lattice_places
-from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, membrane_loads, press_foundation
+from softtact.models.foundation.solve import (
+    FoundationMaps,
+    FoundationSettings,
+    _Press,
+    membrane_loads,
+    press_foundation,
+    settled_contacts,
+)
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
 from softtact.sensors.fields import Edge
@@ -195,6 +202,16 @@ def test_a_force_that_is_not_reached_says_from_which_one_on(compliance):
     load_steps = press_foundation(compliance, points, [4.0], settings=FoundationSettings(max_iterations=1))
     with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* use smaller forces, or the hyperelastic"):
         next(load_steps)
+
+
+@pytest.mark.parametrize("force_n", [0.5, 3.0])
+def test_a_press_begins_with_little_more_contact_than_it_ends_with(compliance, force_n):
+    for mesh, values in POSES.values():
+        points = points_of(mesh, compliance, values)
+        begun = _Press(compliance, points, FoundationSettings()).first(force_n)
+        ended, = settled_contacts(compliance, points, [force_n])
+        assert begun.touching[ended.touching].all()
+        assert begun.touching.sum() < 1.6 * ended.touching.sum()
 
 
 @pytest.mark.parametrize("values", [(0, 0, 0, 0, 0, 0), TILTED])

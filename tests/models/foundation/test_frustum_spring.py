@@ -66,6 +66,8 @@ def test_a_frustum_rocks_only_under_a_force_too_small_to_hold_its_tip_down(law):
     enough = law.upright * law.lean * u / law.tip_radius_mm
     rises = law.rise(u, enough * np.array([0.0, 0.25, 1.0, 2.0]))
     np.testing.assert_allclose(rises, [free, 0.75 * free, 0.0, 0.0], atol=1e-12 * free)
+    by_force = (rises[1] - rises[0]) / (0.25 * enough)
+    np.testing.assert_allclose(law.rocking_compliance(rises), [-by_force, -by_force, 0.0, 0.0], rtol=1e-9)
 
 
 def test_the_lean_of_a_free_tip_balances_the_moment_that_would_hold_it_flat(law):
