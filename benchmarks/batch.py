@@ -26,8 +26,9 @@ from softtact.press.batch import press_batch
 SIZES, IN_TURN = (1, 64, 256, 1024, 4096), 4     # presses of a batch; presses one by one before it
 LONGEST_S = {"elastic": 75.0, "foundation": 20.0}     # of one batch
 READ = "readings, flags and expected errors"
-PARTS = {"undersides": "_undersides", "contact": "press_layers", "of it products with the compliance": "matmul",
-         "of it the stencil": "apply_stencil", READ: "_read"}      # `_read` calls the contact, too
+PARTS = {"undersides": "_undersides", "contact and fields": "press_layers", "of it the compliance among points": "among",
+         "of it products in double precision": "double", "of it products in single precision": "single",
+         "of it the stencil": "apply_stencil", READ: "_read"}      # `_read` calls the contact, too; products of the processor
 
 
 def rows_of(sensor, model, device, clock, sizes):
@@ -64,7 +65,7 @@ def parts_of(sensor, device, size=256):
     profile.runcall(press_batch, sensor, surfaces, poses, 10.0, device=device)
     spent = {name: cumulative for (_, _, name), (_, _, _, cumulative, _) in pstats.Stats(profile).stats.items()}
     seconds = {part: round(spent.get(name, 0.0), 3) for part, name in PARTS.items()}
-    return seconds | {READ: round(seconds[READ] - seconds["contact"], 3), "whole": round(spent["press_batch"], 3)}
+    return seconds | {READ: round(seconds[READ] - seconds["contact and fields"], 3), "whole": round(spent["press_batch"], 3)}
 
 
 def main():
