@@ -6,6 +6,7 @@ import shutil
 import socket
 import time
 import urllib.request
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,3 +128,24 @@ def test_two_tabs_press_by_keys_and_each_has_its_own_press(server):
             return
         time.sleep(0.1)
     pytest.fail("the closed tabs are still there")
+
+
+@needs_browser
+@pytest.mark.slow
+@pytest.mark.parametrize("name, before, load", [("skin", "This press is coarse", "0.2"), ("block", "The object only touches", "1")])
+def test_a_skin_or_a_solid_is_moved_by_keys_pressed_where_it_rests_and_saved(state, folder, tmp_path, name, before, load):
+    start = replace(state, sensor=str(folder / f"{name}.yaml"), force_n=float(load))
+    server = PlayServer(start, {"ball": state.object}, [start.sensor], tmp_path / "out", port=0)
+    try:
+        with Chromium(server.url, width=400, height=800) as tab:
+            tab.wait_for_text(before)
+            pose = server.pages[0].tab.shown.press.pose
+            tab.key("L")
+            tab.wait_for_text(f"--pose={pose[0] + 0.5:g},")
+            tab.wait_for_text("whole, ", tries=2000)      # after the press of the first place
+            assert before not in tab.text and f"--force {load}" in tab.text
+            tab.click("Save press")
+            tab.wait_for_text("Saved ")
+    finally:
+        server.stop()
+    assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".nc", ".png", ".txt"}
