@@ -111,7 +111,7 @@ class Page:
         self._numbers = gui.add_markdown("The first map follows.")
         with gui.add_folder("Load"):
             self._load_by = gui.add_dropdown("load by", ("force", "depth"), initial_value=state.load_by)
-            self._force = gui.add_slider("force, N", LEAST_FORCE_N, 50.0, 0.1, state.force_n, visible=state.load_by == "force")
+            self._force = gui.add_slider("force, N", LEAST_FORCE_N, 50.0, 0.01, state.force_n, visible=state.load_by == "force")
             self._depth = gui.add_slider("depth, mm", 0.01, 2.0, 0.01, state.depth_mm, visible=state.load_by == "depth")
             self._slide_x = gui.add_slider("slide x, mm", -5.0, 5.0, 0.1, 0.0)
             self._slide_y = gui.add_slider("slide y, mm", -5.0, 5.0, 0.1, 0.0)
