@@ -1,4 +1,5 @@
-"""Write what the package ships of its sensors' fast models: the laws of their frusta, each of which takes a new user half a minute.
+"""Write what the package ships of its sensors' fast models: the laws of their frusta, each of which takes a new user half a minute,
+and drafts of their elastic layers, for the first map in `softtact play`.
 
     python scripts/write_prepared.py
 
@@ -11,28 +12,41 @@ import numpy as np
 
 import softtact
 from softtact.files import atomic_path
+from softtact.models.elastic.compliance import draft_cells, elastic_compliance
 from softtact.models.foundation.frustum_spring import frustum_law
-from softtact.press.cache import SHIPPED, shipped_frustum_law
+from softtact.press.cache import SHIPPED, shipped_draft, shipped_frustum_law
 from softtact.sensors.library import known_names
 
 
+def sensors():
+    """The package's sensors with frusta."""
+    every = [softtact.load_sensor(name) for name in known_names("sensors")]
+    return [one for one in every if getattr(one.spec, "frusta_counts", None)]
+
+
 def frustum_files():
-    """The file of the law of each sensor of the package that has frusta, with the sensor."""
-    sensors = [softtact.load_sensor(name) for name in known_names("sensors")]
-    return {shipped_frustum_law(one.spec, one.laws["dielectric"]): one for one in sensors
-            if getattr(one.spec, "frusta_counts", None)}
+    """The file of the law of each sensor's frusta, with the sensor."""
+    return {shipped_frustum_law(one.spec, one.laws["dielectric"]): one for one in sensors()}
+
+
+def draft_files():
+    """The file of the draft of each sensor's elastic layer, with the sensor."""
+    return {shipped_draft(one.spec): one for one in sensors()}
 
 
 def main():
     """Write the files that are missing, and remove others."""
     SHIPPED.mkdir(exist_ok=True)
-    files = frustum_files()
-    for path, sensor in files.items():
+    laws, drafts = frustum_files(), draft_files()
+    for path, sensor in (laws | drafts).items():
         if not path.exists():
             with atomic_path(path) as temporary:
-                np.savez_compressed(temporary, **frustum_law(sensor.spec, sensor.laws["dielectric"]).arrays())
+                if path in laws:
+                    np.savez_compressed(temporary, **frustum_law(sensor.spec, sensor.laws["dielectric"]).arrays())
+                else:
+                    elastic_compliance(sensor.spec, cells=draft_cells(sensor.spec)).save(temporary)
         print(f"{path.name}: {sensor.spec.name}, {path.stat().st_size / 1e3:.0f} kB")
-    for path in set(SHIPPED.glob("*.npz")) - set(files):
+    for path in set(SHIPPED.glob("*.npz")) - set(laws | drafts):
         path.unlink()
 
 

@@ -4,8 +4,9 @@ import shutil
 
 import numpy as np
 import pytest
-from write_prepared import frustum_files
+from write_prepared import draft_files, frustum_files
 
+from softtact.models.elastic.compliance import Compliance, draft_cells, elastic_compliance
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
 from softtact.press import cache
 from softtact.sensors.frusta import Friction
@@ -56,6 +57,19 @@ def test_a_damaged_file_of_the_package_is_replaced_in_the_users_cache(tmp_path, 
     for _ in range(2):
         cache.cached_frustum_law(sensor.spec, sensor.laws["dielectric"])
     assert len(computed) == 1
+
+
+def test_the_drafts_of_the_packages_sensors_need_no_computing(computed, monkeypatch):
+    monkeypatch.setattr(cache, "elastic_compliance", lambda spec, **_: pytest.fail(f"{spec.name}: computed"))
+    for path, sensor in draft_files().items():
+        np.testing.assert_array_equal(cache.cached_draft(sensor.spec).blocks.blocks, Compliance.load(path).blocks.blocks)
+
+
+@pytest.mark.slow
+def test_a_draft_that_is_shipped_is_the_one_that_is_computed():
+    for path, sensor in draft_files().items():
+        made = elastic_compliance(sensor.spec, cells=draft_cells(sensor.spec)).blocks.blocks
+        np.testing.assert_allclose(Compliance.load(path).blocks.blocks, made, rtol=0, atol=ROUND_OFF * made.max())
 
 
 @pytest.mark.slow

@@ -51,11 +51,19 @@ def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
 
 
 def cached_draft(spec: AnySpec, *, threads: int = 1) -> DraftCompliance:
-    """The elastic layer's `DraftCompliance`, in a fifth of the time; cached by the values that it depends on."""
-    cells = draft_cells(spec)
-    return draft_of(spec, _cached("draft", [*_of_layer(spec), cells], Compliance,
+    """The elastic layer's `DraftCompliance`, in a fifth of the time; shipped, or cached by the values that it depends on."""
+    return draft_of(spec, _cached("draft", _of_draft(spec), Compliance,
                                   f"{spec.name}: computing a draft of the elastic layer's compliance, once for this sensor",
-                                  lambda: elastic_compliance(spec, threads=threads, cells=cells)))
+                                  lambda: elastic_compliance(spec, threads=threads, cells=draft_cells(spec))))
+
+
+def shipped_draft(spec: AnySpec) -> Path:
+    """Where the package has the `Compliance` of a sensor's `cached_draft`, if it has it."""
+    return SHIPPED / _name("draft", _of_draft(spec))
+
+
+def _of_draft(spec):
+    return [*_of_layer(spec), draft_cells(spec)]
 
 
 def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
