@@ -20,7 +20,7 @@ PERFORMANCE = ROOT / "docs" / "performance.md"
 EDGE, FAST, SOLID, VIRTUAL = (ROOT / "docs" / "explanation" / f"{name}.md"
                                for name in ("edge", "fast_models", "solid", "virtual_sensor"))
 LEARN = ROOT / "docs" / "how-to" / "learn_with_the_environment.md"
-POSE = ROOT / "docs" / "how-to" / "find_a_pose_from_taxels.md"
+POSE, DECIDE = (ROOT / "docs" / "how-to" / f"{name}.md" for name in ("find_a_pose_from_taxels", "decide_the_claims"))
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
@@ -230,6 +230,37 @@ def expected_error() -> str:
     return f"{source('expected_error')}\n\n{table('what, value', rows)}"
 
 
+def other_sensors() -> str:
+    """Whether the 90 % bound of the expected error holds on sensors that it was not fitted to."""
+    read, rows = record("expected_error_elsewhere"), []
+    for model, sensors in read["summary"].items():
+        for sensor, found in sensors.items():
+            ratio = ", ".join(f"{value:.2f}" for value in found["error_over_bound_5_50_95"])
+            rows.append([model, sensor, found["contacts"], found["load_steps"], f"{found['within_bound']:.3f}", ratio])
+    head = "model, pad, contacts, load steps, share within the bound, error over bound: 5; 50; 95 %"
+    return (f"{source('expected_error_elsewhere')} {read['contacts_done']} of {read['contacts_planned']} random contacts, in "
+            f"order, each drawn from its own seed; {read['failed']} of them failed.\n\n{table(head, rows)}")
+
+
+def anchors() -> str:
+    """Presses of the study `decide` on a piece of the sensor: CalculiX at the same indentation."""
+    read, rows = record("decide_anchors"), []
+    for row in sorted(read["rows"], key=lambda row: (row["truth"], row["object"])):
+        head = [row["truth"], row["object"].replace("_", " ")]
+        if "failed" in row:
+            rows.append([*head, *[""] * 5, "CalculiX stopped"])
+            continue
+        shares = " and ".join(f"{share[0]:.3f}" for share in row.get("lower_share", []))
+        missed = [key.replace("_", " ") for key, met in row["within"].items() if not met]
+        rows.append([*head, f"{row['force_n'][0]:g}", f"{row['indentation_mm'][0]:.3f}", f"{row['force'][0]:+.1%}",
+                     f"{row['map_rms'][0]:.1%}; {row['map_largest'][0]:.1%}", shares, ", ".join(missed) or "all met"])
+    head = ("truth, object, our force (N), indentation (mm), force of CalculiX over ours, interface's difference: rms; largest, "
+            "lower feature's share: ours; CalculiX', missed")
+    limits = ", ".join(f"{key.replace('_', ' ')} {limit:g}" for key, limit in read["tolerances"].items())
+    return (f"{source('decide_anchors')} {len(read['rows'])} of {read['planned']} presses. Tolerances, stated before: {limits}.\n\n"
+            f"{table(head, rows)}")
+
+
 def solid_races() -> str:
     """A press of two solids by us and by others: processor time, and what of ours goes where."""
     rows = []
@@ -339,7 +370,9 @@ def numbers_page(counts: dict[str, int]) -> str:
 def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
-              FAST: {"batches": batches(), "batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error()},
+              FAST: {"batches": batches(), "batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error(),
+                     "other sensors": other_sensors()},
+              DECIDE: {"anchors": anchors()},
               SOLID: {"races": solid_races(), "kernels": solid_kernels()},
               VIRTUAL: {"electrode field": electrode_field()}, POSE: {"poses": poses()},
               LEARN: {"environment": environment(), "vector environment": vector_environment()}}
