@@ -140,6 +140,20 @@ def test_an_anchor_that_contains_itself_is_refused(tmp_path):
         read_yaml(tmp_path / "a.yaml", missing="")
 
 
+@pytest.mark.parametrize("text", ["a: " + 30_000 * "[" + 30_000 * "]", 30_000 * "- " + "1"])
+def test_nesting_that_would_end_the_process_is_refused(text, tmp_path):
+    (tmp_path / "a.yaml").write_text("b: 1\n" * text.startswith("a") + text)
+    with pytest.raises(InputError, match=r"a.yaml: not valid YAML \(line [12] is nested more than 100 deep\)"):
+        read_yaml(tmp_path / "a.yaml", missing="")
+
+
+@pytest.mark.parametrize(("text", "words"), [("a:\n\tb: 1\n", r"character '\\t'"), ("a: *other\n", "undefined alias 'other'")])
+def test_a_fault_of_yaml_is_shown_with_its_character_or_alias(text, words, tmp_path):
+    (tmp_path / "a.yaml").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_yaml(tmp_path / "a.yaml", missing="")
+
+
 def test_the_variable_raises_all_limits(monkeypatch):
     count = 3 * LIMITS["facets"].most
     with pytest.raises(InputError, match=f"set {VARIABLE}=3."):

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)     # libyaml's, a tenth of the time, where PyYAML was built with it
+_DEEPEST = 100        # levels of a YAML file
 _COUNTED = 10**12     # values of a YAML file; more are not told apart
 _AGAIN = "take a copy of it, or make it again"
 PROVENANCE = ("softtact_version", "config_digest", "seed")     # attributes of every data set that is written
@@ -119,8 +121,11 @@ def read_yaml(path: str | Path, *, missing: str) -> Any:
     Raises InputError if there is no such file, if it is not valid YAML, or if a mapping has a key twice.
     """
     check_input(path, "yaml", missing=missing)
+    text = ""
     try:
-        loader = yaml.CSafeLoader(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+        _refuse_deep(text)
+        loader = _LOADER(text)
         node = loader.get_single_node()
         if node is None:
             return None
@@ -128,7 +133,28 @@ def read_yaml(path: str | Path, *, missing: str) -> Any:
         _refuse_twice(node, loader)
         return loader.construct_document(node)
     except (UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:     # ValueError: 2001-99-99 is no date
-        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+        told = _clearer(text, error) if isinstance(error, yaml.YAMLError) else error
+        raise InputError(f"{path}: not valid YAML ({' '.join(str(told).split())}); correct it.") from None
+
+
+def _clearer(text, error):
+    """What PyYAML's own parser says of a text: it names the character or the alias that libyaml leaves out, and shows the place."""
+    try:
+        yaml.compose(text, yaml.SafeLoader)
+    except yaml.YAMLError as clearer:
+        return clearer
+    except RecursionError:
+        pass
+    return error
+
+
+def _refuse_deep(text):
+    """Refuse nesting for which libyaml, which calls itself for each level, would run out of stack and end the process."""
+    depth = 0
+    for event in yaml.parse(text, _LOADER):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise ValueError(f"line {event.start_mark.line + 1} is nested more than {_DEEPEST} deep")
 
 
 def _refuse_twice(root, loader):

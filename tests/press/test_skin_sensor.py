@@ -1,5 +1,7 @@
 """A robot skin as a sensor: presses by name or design, the same counts as the design's study, its files, and what it refuses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -7,7 +9,7 @@ from support.small_sensors import SKIN, small_skin
 
 import softtact
 from softtact.cli import main
-from softtact.errors import InputError
+from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.press.result import read_press
 from softtact.press.skin import prepared_design
 from softtact.skin.analysis import CoarseSkin, Skin, analyse
@@ -37,6 +39,40 @@ def test_a_press_has_the_counts_and_the_depth_that_the_skins_own_analysis_finds(
     assert pressed.indentation_mm[-1] == pytest.approx(load.indentation_mm) and pressed.normal_force_n.tolist() == [0.2, 0.5]
     assert pressed.solid.displacement_mm[-1][:, 2].min() == pytest.approx(-load.indentation_mm, rel=0.05)
     assert pressed.load("object")[-1, 2] == pytest.approx(-0.5)
+
+
+def test_the_inside_of_the_elastomer_moves_with_its_upper_side(skin, pressed):
+    design, body = prepared_design(skin.spec), skin.prepared_models["elastic"]
+    load = contact_load(body, BALL, TAXEL, force_n=0.5, elastomer=design.elastomer)
+    whole = body.layer.displacement(load, young_mpa=design.elastomer.young_mpa(load.pressure_mpa))
+    np.testing.assert_allclose(pressed.solid.displacement_mm[-1], whole, atol=1e-12)
+
+
+def test_a_force_beyond_the_elastomer_leaves_the_result_of_the_forces_before(skin):
+    seen = []
+    with pytest.raises(ConvergenceError, match=r"^small_skin at 4.5 N: .*twice") as ended:
+        skin.press(BALL, force_n=[0.2, 0.5, 4.5], label="", on_step=seen.append)
+    assert ended.value.result.normal_force_n.tolist() == [0.2, 0.5] and [one.steps for one in seen] == [1, 2]
+    assert ended.value.result.readings["skin"].shape == (2, 12) and ended.value.result.solid.displacement_mm.shape[0] == 2
+
+
+def test_a_time_limit_ends_a_press(skin):
+    with pytest.raises(TimeLimitError, match="small_skin at 0.2 N"):
+        skin.press(BALL, force_n=0.2, label="", time_limit_s=1e-9)
+
+
+def test_volume_strained_beyond_the_elastomers_tests_is_flagged(skin, monkeypatch):
+    from softtact.skin import contact
+
+    small = contact.contact_load
+    monkeypatch.setattr(contact, "press_at_finite_strains", lambda *args, **given: replace(small(*args, **given), beyond_tests=0.2))
+    pressed = skin.press(BALL, force_n=0.2, model="solid", label="")
+    assert not pressed.within_validity[0] and "extrapolated" in pressed.validity_reason[0]
+    assert pressed.extrapolated_volume_fraction[0] == 0.2
+
+
+def test_no_number_of_a_load_is_minus_zero(pressed):
+    assert not np.signbit(pressed.load("object")[:, :2]).any()
 
 
 def test_a_result_is_read_back_as_it_was_written(pressed, tmp_path):

@@ -4,19 +4,18 @@
 from rest. A result holds the elastomer as its `solid`, and the reading `skin`: (step, taxel) in counts above rest.
 """
 
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.errors import InputError, require
+from softtact.errors import ConvergenceError, InputError, require
 from softtact.geometry.pose import Pose
 from softtact.models.solid.result import SolidFields
 from softtact.press.result import PressResult
 from softtact.press.task import PressTask
-from softtact.progress import announce
+from softtact.progress import Watch, announce
 from softtact.readout.registry import labelled
 from softtact.sensors.skin import SkinSpec
 
@@ -56,31 +55,46 @@ def prepared_design(spec: SkinSpec) -> "PreparedDesign":
 def press_skin(sensor: "Sensor", task: PressTask, *, model: str) -> PressResult:
     """Press a rigid object straight down by forces; by default the middle of its bounding box is over that of the elastomer.
 
-    Raises InputError for another motion, a soft object, one that misses the elastomer, and a force beyond what the model bears.
+    Raises InputError for another motion, a soft object, one that misses the elastomer, and a first force beyond what the model
+    bears; ConvergenceError for a later one, with the result of those before, and for a solution that is not found.
     """
-    from softtact.skin.analysis import analyse
-    from softtact.skin.contact import contact_load, press_at_finite_strains
-
     if task.soft or task.motion.forces_n is None:
         what = "a soft object" if task.soft else "this motion"
         raise InputError(f"{sensor.spec.name}, a sensor of kind skin: it is pressed by a rigid object straight down by forces, not "
                          f"by {what}; give a rigid mesh and force_n.")
+    placed = over_skin(sensor.prepared_models["elastic"], task.pressed, task.pose, sensor.spec.name)     # type: ignore[arg-type]
+    forces, reached = np.array(task.motion.forces_n), task.control.reached
+    found: list[tuple[Load, Readings]] = []
+
+    def so_far() -> PressResult:
+        steps = len(reached.times)
+        return _result(sensor, model, forces[:steps], found[:steps], np.array(reached.times))
+
+    reached.follow(map(found.append, _steps(sensor, task, placed, model)), len(forces), so_far)
+    return so_far()
+
+
+def _steps(sensor, task, placed, model):
+    """Load and readings of each force."""
+    from softtact.skin.analysis import analyse
+    from softtact.skin.contact import contact_load, press_at_finite_strains
+
     skin, design = sensor.prepared_models["elastic"], prepared_design(sensor.spec)
-    placed = over_skin(skin, task.pressed, task.pose, sensor.spec.name)     # type: ignore[arg-type]
-    middle = placed.bounds.mean(axis=0)
-    find = contact_load if model == "elastic" else press_at_finite_strains
-    loads, readings, seconds = [], [], []
-    for force in task.motion.forces_n:
-        start = time.perf_counter()
+    find, middle = contact_load if model == "elastic" else press_at_finite_strains, placed.bounds.mean(axis=0)
+    watch = Watch(limit_s=task.control.time_limit_s)
+    for number, force in enumerate(task.motion.forces_n):
+        where = f"{sensor.spec.name} at {force:g} N"
+        watch.report(where)
         if task.control.label:
             announce(f"{task.control.label}: contact and field of the skin at {force:g} N, {model} model")
         try:
-            loads.append(find(skin, placed, (middle[0], middle[1]), force_n=force, elastomer=design.elastomer, name=_OBJECT))
-            readings.append(analyse(skin, loads[-1:], elastomer=design.elastomer, converter=design.converter))
+            load = find(skin, placed, (middle[0], middle[1]), force_n=force, elastomer=design.elastomer, name=_OBJECT)
+            readings = analyse(skin, [load], elastomer=design.elastomer, converter=design.converter)
         except InputError as error:
-            raise InputError(f"{sensor.spec.name} at {force:g} N: {error}") from None
-        seconds.append(time.perf_counter() - start)
-    return _result(sensor, model, np.array(task.motion.forces_n), loads, readings, np.array(seconds))
+            raise (ConvergenceError if number else InputError)(f"{where}: {error}") from None
+        except ConvergenceError as error:
+            raise ConvergenceError(f"{where}: {error}") from None
+        yield load, readings
 
 
 def over_skin(skin: "Skin", mesh: trimesh.Trimesh, pose: Pose | None, name: str) -> trimesh.Trimesh:
@@ -99,26 +113,26 @@ def over_skin(skin: "Skin", mesh: trimesh.Trimesh, pose: Pose | None, name: str)
     return placed
 
 
-def _result(sensor: "Sensor", model: str, force: np.ndarray, loads: "list[Load]", readings: "list[Readings]",
+def _result(sensor: "Sensor", model: str, force: np.ndarray, found: "list[tuple[Load, Readings]]",
             seconds: np.ndarray) -> PressResult:
     """The result of forces (step,) in N as loads, each with its readings."""
     from softtact.skin.contact import solid_layer
 
-    skin, steps = sensor.prepared_models["elastic"], len(loads)
+    skin, steps, (loads, readings) = sensor.prepared_models["elastic"], len(found), zip(*found, strict=True)
     mesh = solid_layer(skin.layer.mesh)
     down = np.array([load.indentation_mm for load in loads])
     reasons = np.array(["; ".join(one.remarks) for one in readings])
-    displacement = np.zeros((steps, *mesh.points.shape))
-    displacement[:, skin.layer.mesh.top] = [one.displacement_mm[0] for one in readings]
     frame_load, way = np.full((steps, 1, 6), np.nan), np.zeros((steps, 1, 3))
-    frame_load[:, 0, :3], way[:, 0, 2] = -force[:, None] * [0.0, 0.0, 1.0], -down
-    solid = SolidFields.of_displacement(mesh, displacement, frames=(_OBJECT,), pairs=("skin on object",), frame_load=frame_load,
+    frame_load[:, 0, :2], frame_load[:, 0, 2], way[:, 0, 2] = 0.0, -force, -down
+    moved = np.array([one.layer_mm[0] for one in readings])
+    solid = SolidFields.of_displacement(mesh, moved, frames=(_OBJECT,), pairs=("skin on object",), frame_load=frame_load,
                                         frame_way_mm=way, contact_pressure_mpa=_pressure(skin, mesh, loads)[:, None])
     unknown, one = np.full(steps, np.nan), np.ones(steps, dtype=int)
     return PressResult(
         model=model, sensor=sensor.spec.name, solver="direct", normal_force_n=force, indentation_mm=down,
         contact_area_mm2=np.array([load.total_n / load.pressure_mpa for load in loads]), penetration_mm=np.zeros(steps),
-        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown, iterations=one,
+        frustum_compression_mm=unknown, residual_n=unknown, iterations=one,
+        extrapolated_volume_fraction=np.array([load.beyond_tests for load in loads]),
         converged=one.astype(np.int8), within_validity=(reasons == "").astype(np.int8), validity_reason=reasons,
         wall_time_s=seconds, readings={"skin": _reading(skin, np.concatenate([one.counts for one in readings]))},
         attributes=sensor.attributes | {"thickness_mm": skin.thickness_mm}, solid=solid)

@@ -21,6 +21,7 @@ from softtact.skin.layout import Layout
 from softtact.skin.loads import Load, disc, ellipse, refuse_beside
 
 _LARGE_STRAIN = 0.3     # of the thickness: the papers' elastomers were tested up to it
+BEYOND = 0.005          # share of the volume strained beyond the tests, from which it is told
 _RATIOS = 6             # ratios of pressure to modulus solved for a curve, at the extrema of a Chebyshev polynomial
 _DEFORMATION_MESHES = {"coarse": (1.5, 2), "standard": (1.0, 4), "fine": (0.75, 5)}     # spacing in mm, layers
 _FIELD_MESHES = {
@@ -121,6 +122,8 @@ class Readings:
     """(load, taxel): whole counts above rest."""
     displacement_mm: np.ndarray
     """(load, node, 3): of the nodes on the upper side."""
+    layer_mm: np.ndarray
+    """(load, node, 3): displacement of all nodes."""
     young_mpa: np.ndarray
     """(load,): the secant modulus that each load was solved with."""
     remarks: list[str]
@@ -238,7 +241,7 @@ class CoarseSkin(Skin):
 
 def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converter: Converter) -> Readings:
     """`Readings` of loads one by one, each solved with the elastomer's secant modulus at its pressure."""
-    rows, tops, moduli, remarks = [], [], [], []
+    rows, moved, moduli, remarks = [], [], [], []
     for load in loads:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ExtrapolationWarning)
@@ -248,15 +251,17 @@ def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converte
         if displacement is None:
             displacement = skin.layer.displacement(load, young_mpa=young)
         rows.append(skin.capacitance_ff(displacement))
-        tops.append(displacement[skin.layer.mesh.top])
+        moved.append(displacement)
         moduli.append(young)
         compression = -displacement[:, 2].min() / skin.thickness_mm
         if compression > _LARGE_STRAIN and load.displacement_mm is None:
             remarks.append(f"{load.words}: the elastomer is compressed by {compression:.0%} of its thickness, where small strains "
                            "are coarse; take the reading as a trend.")
-    capacitance = np.array(rows)
-    return Readings(capacitance, skin.at_rest_ff, converter.counts(np.vstack([skin.at_rest_ff, capacitance])), np.array(tops),
-                    np.array(moduli), list(dict.fromkeys(remarks)))
+        if load.beyond_tests > BEYOND:
+            remarks.append(f"{load.words}: the law of the elastomer is extrapolated there.")
+    capacitance, layer = np.array(rows), np.array(moved)
+    return Readings(capacitance, skin.at_rest_ff, converter.counts(np.vstack([skin.at_rest_ff, capacitance])),
+                    layer[:, skin.layer.mesh.top], layer, np.array(moduli), list(dict.fromkeys(remarks)))
 
 
 def alone(layout: Layout, taxel: int) -> Layout:

@@ -24,7 +24,7 @@ from softtact.materials.linear import LinearConstants
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.progress import Watch, announce
-from softtact.skin.analysis import Skin
+from softtact.skin.analysis import BEYOND, Skin
 from softtact.skin.elastomers import Elastomer
 from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
@@ -60,7 +60,8 @@ def contact_load(skin: Skin, mesh: trimesh.Trimesh, centre_mm: tuple[float, floa
             words = f"{force_n:g} N by {name} at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm, {1e3 * pressure:.3g} kPa in the mean"
             return Load(nodes[near[touching]], forces[touching], pressure, words, indentation_mm=indentation)
     raise InputError(f"load {name!r}: {force_n:g} N presses it deeper than {_DEPTHS[-1]:.0%} of the {skin.thickness_mm:g} mm of "
-                     "elastomer, where small strains do not hold; choose a smaller force_n, or strains: finite.")
+                     "elastomer, where small strains do not hold; choose a smaller force, or finite strains (in a design "
+                     "`strains: finite`, of a press the model solid).")
 
 
 def placed_over(mesh: trimesh.Trimesh, centre_mm: tuple[float, float], turned_deg: tuple[float, float, float]) -> trimesh.Trimesh:
@@ -192,7 +193,7 @@ def _load_of(body: SolidBody, step: SolidLoadStep, force_n: float, nodes: int, w
     at = np.einsum("pk,pki->pi", points.values, body.points[points.nodes])[touching, :2]
     beyond = step.extrapolated_volume_fraction
     words += f", {1e3 * force_n / area:.3g} kPa in the mean"
-    if beyond > 0.005:
+    if beyond > BEYOND:
         words += f", {beyond:.0%} of the volume strained beyond the tests"
     return Load(at, forces * (force_n / forces.sum()), force_n / area, words, step.state.displacement[:nodes],
-                indentation_mm=-float(step.state.poses[0].translation[2]))
+                indentation_mm=-float(step.state.poses[0].translation[2]), beyond_tests=beyond)

@@ -30,6 +30,8 @@ class Load:
     """(node, 3) of the layer under the load, where it was solved with it, at finite strains."""
     indentation_mm: float = np.nan
     """Of an object below first touch; nan of a pressure."""
+    beyond_tests: float = np.nan
+    """Share of the volume that is strained beyond the elastomer's tests, at finite strains."""
 
     @property
     def total_n(self) -> float:
