@@ -71,6 +71,18 @@ def test_volume_strained_beyond_the_elastomers_tests_is_flagged(skin, monkeypatc
     assert pressed.extrapolated_volume_fraction[0] == 0.2
 
 
+def test_a_contact_of_few_points_is_flagged(skin):
+    mesh = skin.prepared_models["elastic"].layer.mesh
+    x, y, _ = min(mesh.nodes_mm[mesh.top], key=lambda node: np.hypot(*(node[:2] - TAXEL)))
+    tip = skin.press(trimesh.creation.icosphere(subdivisions=2, radius=0.3), pose=[x, y, 5, 0, 0, 0], force_n=0.003, label="")
+    assert not tip.within_validity[0] and "points of the elastomer's mesh" in tip.validity_reason[0]
+
+
+def test_an_object_between_the_points_of_the_mesh_is_refused_with_its_size(skin):
+    with pytest.raises(InputError, match=r"between the points of the mesh of small_skin: it is 0.1 x 0.1 mm"):
+        skin.press(trimesh.creation.box([0.1, 0.1, 1.0]), force_n=0.003, pose=[15.3, 8.8, 5, 0, 0, 0], label="")
+
+
 def test_no_number_of_a_load_is_minus_zero(pressed):
     assert not np.signbit(pressed.load("object")[:, :2]).any()
 
@@ -130,6 +142,7 @@ def test_the_command_line_presses_a_skin_and_prints_its_counts(tmp_path, capsys)
     for arguments, words in ((["--force", "0.5", "--model", "foundation"], "only with the elastic or the solid model"),
                              (["--motion", "z -0.3"], "straight down by forces, not by this motion"),
                              (["--force", "9"], "out of the range of sensor small_skin"),
+                             (["--force", "0.5", "--device", "auto"], "--device auto: it has no effect on a sensor of kind skin"),
                              (["--force", "4.5"], "small_skin at 4.5 N: ")):
         assert main([*press, *arguments]) == 1
         assert words in capsys.readouterr().err

@@ -177,7 +177,7 @@ def _refuse_idle(options, spec):
         if options.model not in ("auto", *spec.models):
             raise InputError(f"--model {options.model}: a sensor of kind {spec.kind}, such as {options.sensor}, is pressed "
                              f"only with the {' or the '.join(spec.models)} model; leave it out.")
-        for name in ("policy", "tolerance", "mesh_quality"):
+        for name in ("policy", "tolerance", "mesh_quality", *(["device"] if spec.kind == "skin" else [])):
             if getattr(options, name) != _DEFAULTS[name]:
                 raise InputError(f"{_given(options, name)}: it has no effect on a sensor of kind {spec.kind}; "
                                  f"{_REMEDIES.get(name, 'leave it out')}.")

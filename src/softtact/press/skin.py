@@ -107,6 +107,9 @@ def over_skin(skin: "Skin", mesh: trimesh.Trimesh, pose: Pose | None, name: str)
     height, _ = HeightField(placed)(*skin.layer.mesh.nodes_mm[skin.layer.mesh.top, :2].T)
     if not (height < NO_CONTACT_MM).any():
         (x0, y0, _), (x1, y1, _) = placed.bounds
+        if skin.layout.inside(placed.bounds.mean(axis=0)[None, :2], margin_mm=0.0)[0]:
+            raise InputError(f"The object lies between the points of the mesh of {name}: it is {x1 - x0:.4g} x {y1 - y0:.4g} mm; "
+                             "correct its unit, or give a smaller mesh.spacing_mm in the sensor's file.")
         raise InputError(f"The object misses the skin {name}: it spans x {x0:.4g} to {x1:.4g}, y {y0:.4g} to {y1:.4g} mm, beside "
                          "the elastomer; correct its pose.")
     placed.apply_translation([0.0, 0.0, skin.thickness_mm - height.min()])
@@ -121,7 +124,11 @@ def _result(sensor: "Sensor", model: str, force: np.ndarray, found: "list[tuple[
     skin, steps, (loads, readings) = sensor.prepared_models["elastic"], len(found), zip(*found, strict=True)
     mesh = solid_layer(skin.layer.mesh)
     down = np.array([load.indentation_mm for load in loads])
-    reasons = np.array(["; ".join(one.remarks) for one in readings])
+    area = np.array([load.total_n / load.pressure_mpa for load in loads])
+    least = skin.least_points * skin.layout.area_mm2 / len(skin.layer.mesh.top)
+    few = [f"the contact of {one:.2g} mm2 has less than {skin.least_points} points of the elastomer's mesh: depth and counts are "
+           "coarse; give a smaller mesh.spacing_mm in the sensor's file" if one < least else "" for one in area]
+    reasons = np.array(["; ".join(filter(None, [*one.remarks, reason])) for one, reason in zip(readings, few, strict=True)])
     frame_load, way = np.full((steps, 1, 6), np.nan), np.zeros((steps, 1, 3))
     frame_load[:, 0, :2], frame_load[:, 0, 2], way[:, 0, 2] = 0.0, -force, -down
     moved = np.array([one.layer_mm[0] for one in readings])
@@ -130,7 +137,7 @@ def _result(sensor: "Sensor", model: str, force: np.ndarray, found: "list[tuple[
     unknown, one = np.full(steps, np.nan), np.ones(steps, dtype=int)
     return PressResult(
         model=model, sensor=sensor.spec.name, solver="direct", normal_force_n=force, indentation_mm=down,
-        contact_area_mm2=np.array([load.total_n / load.pressure_mpa for load in loads]), penetration_mm=np.zeros(steps),
+        contact_area_mm2=area, penetration_mm=np.zeros(steps),
         frustum_compression_mm=unknown, residual_n=unknown, iterations=one,
         extrapolated_volume_fraction=np.array([load.beyond_tests for load in loads]),
         converged=one.astype(np.int8), within_validity=(reasons == "").astype(np.int8), validity_reason=reasons,
