@@ -80,6 +80,16 @@ def test_where_much_has_changed_a_new_factor_is_made(problem, factors):
     assert len(factors) == 3
 
 
+@pytest.mark.parametrize("height_mm", [1.0, 5.0])
+def test_forces_are_found_to_single_precision_however_far_above_the_object_starts(problem, height_mm):
+    matrix, spring, right = problem
+    rows, away, enough = np.arange(10, 110), np.where(np.arange(SIZE) < PATCHES, -height_mm, 0.0), 1e-7 * TOTAL
+    near, far = (ActiveSystem(matrix, PATCHES).solve(rows, spring, moved, np.zeros(SIZE), TOTAL, enough)
+                 for moved in (right, right + away))
+    np.testing.assert_allclose(far[0], near[0], atol=2e-5)
+    assert far[2] == pytest.approx(near[2] + height_mm, abs=1e-6)
+
+
 def test_a_system_that_is_not_positive_definite_is_refused(problem):
     matrix, spring, right = problem
     with pytest.raises(sla.LinAlgError):

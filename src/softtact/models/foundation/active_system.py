@@ -51,11 +51,12 @@ class ActiveSystem:
             return None
         x = start[rows] + (total - loaded @ start[rows]) / stiffness * per_depth
         moved = self._product(rows, x)
-        residual, direction, before = right - moved[rows] - spring * x, np.zeros(len(x)), 1.0
+        residual, direction, before, depth = right - moved[rows] - spring * x, np.zeros(len(x)), 1.0, 0.0
         for _ in range(_ITERATIONS):
             step = factor.solve(residual)
-            depth = -(loaded @ step) / stiffness
-            step += depth * per_depth
+            further_down = -(loaded @ step) / stiffness
+            step += further_down * per_depth
+            depth, residual = depth + further_down, residual + further_down * loaded     # what is left is small in single precision
             if np.abs(step).max() <= enough:
                 forces = np.zeros(len(moved))
                 forces[rows] = x
