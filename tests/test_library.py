@@ -14,6 +14,7 @@ import trimesh
 import yaml
 
 import softtact
+from softtact.devices import find_device
 from softtact.errors import EXTRAS, InputError, missing_extra
 from softtact.sensors.library import known_names, material_file, sensor_file
 
@@ -190,6 +191,12 @@ def test_a_gpu_needs_the_extra_and_auto_does_without(tmp_path):
     assert (status, said) == (0, "cpu\n")
     status, _, complained = python(f"{code}devices.find_device('cuda')")
     assert status == 1 and "InputError: device='cuda': This needs torch" in complained and "softtact[learn]" in complained
+
+
+def test_warps_kernels_on_the_processor_need_the_extra_too(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"device='warp': This needs warp.*softtact\[device\]"):
+        find_device("warp", library="warp")
 
 
 def test_another_package_that_is_missing_is_no_extras_business():

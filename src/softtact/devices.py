@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from softtact.errors import InputError, how_to_install
+from softtact.errors import InputError, how_to_install, require
 
 # For each library: its name in messages, a pattern of the device names that it accepts, and these names for a message.
 _NAMES = {"torch": ("torch", r"cpu|auto|cuda(:\d+)?", "'cpu', 'cuda', 'cuda:1' or 'auto'"),
@@ -18,11 +18,13 @@ def find_device(name: str, *, library: str = "torch") -> str:
     """The device for a name: `cpu`, or the library's name of a GPU. `auto` takes a GPU if there is one; `cuda` requires one.
 
     library: torch, or warp, which also sums elements up on the processor, under the name `warp`
-    Raises InputError where the name is unknown, or the GPU that was asked for is not there.
+    Raises InputError where the name is unknown, or the library or the GPU that was asked for is not there.
     """
     title, pattern, choices = _NAMES[library]
     if not re.fullmatch(pattern, str(name)):
         raise InputError(f"device={name!r} is unknown; write {choices}.")
+    if name == "warp":
+        require("warp", f"device={name!r}")
     if name in ("cpu", "warp") or (name == "auto" and not _has_driver()):
         return name.replace("auto", "cpu")
     try:

@@ -7,6 +7,7 @@ import socket
 import time
 import urllib.request
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from websockets.exceptions import ConnectionClosed  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 
 from softtact.cli import main  # noqa: E402
+from softtact.play.page import _refused  # noqa: E402
 from softtact.play.server import PlayServer, _limit_uploads  # noqa: E402
 
 needs_browser = pytest.mark.skipif(not shutil.which("chromium"), reason="Chromium is not installed")
@@ -81,6 +83,12 @@ def test_an_upload_over_the_limit_is_not_taken_into_memory(monkeypatch):
     for size in (5000, 2000):
         handlers[_messages.FileTransferStartUpload](0, _messages.FileTransferStartUpload("button", "id", "part.stl", "", 1, size))
     assert started == [2000] and "part.stl" in told[0] and not Client.gui._current_file_upload_states
+
+
+def test_a_refused_press_says_whose_the_scene_is(state):
+    assert _refused("It misses.", None) == "**No map.** It misses."
+    before = SimpleNamespace(state=replace(state, sensor="gelsight_mini"))
+    assert "the press before, on gelsight\\_mini." in _refused("It misses.", before)
 
 
 def test_what_cannot_be_played_is_refused_before_the_server_starts(tmp_path, capsys, monkeypatch):

@@ -66,7 +66,7 @@ class Page:
 
     def refuse(self, sentence: str) -> None:
         """Show why there is no map."""
-        self._numbers.content = f"**No map.** {_plain(sentence)}"
+        self._numbers.content = _refused(sentence, self.tab.shown)
 
     def tell(self, sentence: str) -> None:
         """Show what a button did."""
@@ -362,6 +362,12 @@ class Page:
             self._sensor.value = state.sensor
         if (name := self._name_of(state.object)) != self._object.value:
             self._object.value = name
+
+
+def _refused(sentence: str, before: Shown | None) -> str:
+    """Why there is no map, and what the scene shows instead."""
+    shown = f"\n\nScene, map and lines are still those of the press before, on {_plain(before.state.sensor)}." if before else ""
+    return f"**No map.** {_plain(sentence)}{shown}"
 
 
 def _plain(sentence: str) -> str:
