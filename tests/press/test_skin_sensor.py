@@ -84,7 +84,14 @@ def test_an_object_between_the_points_of_the_mesh_is_refused_with_its_size(skin)
 
 
 def test_no_number_of_a_load_is_minus_zero(pressed):
-    assert not np.signbit(pressed.load("object")[:, :2]).any()
+    assert not np.signbit(pressed.load("object")[:, :2]).any() and not np.signbit(pressed.force_n[:, :2]).any()
+
+
+@pytest.mark.parametrize(("use", "words"), [(lambda skin: skin.with_friction(0.3), "pressed without friction"),
+                                            (lambda skin: skin.prepared("foundation"), "a skin has no map of a plane")])
+def test_what_a_skin_does_not_have_is_refused_in_a_sentence(skin, use, words):
+    with pytest.raises(InputError, match=f"small_skin, a sensor of kind skin: .*{words}"):
+        use(skin)
 
 
 def test_a_result_is_read_back_as_it_was_written(pressed, tmp_path):

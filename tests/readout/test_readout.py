@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from softtact.readout.registry import Readings, Unlabelled, labelled
+from softtact.readout import registry
+from softtact.readout.registry import Readings, Unlabelled, labelled, register
 from softtact.readout.virtual_sensor import amplified, converted, random_walk
 
 
@@ -37,6 +38,13 @@ def test_without_a_step_and_a_limit_the_converter_gives_what_it_gets():
 
 def test_a_dead_taxel_reads_zero_whatever_the_noise():
     assert converted(np.array([500.0, 500.0]), noise=np.array([3.0, 3.0]), dead=np.array([True, False])).tolist() == [0, 503]
+
+
+def test_a_users_readout_stays_when_the_packages_own_of_its_kind_is_loaded_later(monkeypatch):
+    monkeypatch.setattr(registry, "_KINDS", {})
+    mine, again = (register("depth")(type("Mine", (), {"__module__": "mine"})) for _ in range(2))
+    register("depth")(type("Own", (), {"__module__": "softtact.readout.depth"}))
+    assert registry._KINDS["depth"] is again is not mine
 
 
 def test_counts_get_their_labels_when_they_are_asked_for():

@@ -151,7 +151,7 @@ class PressResult:
         steps, down = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
         defaults: dict[str, Callable[[], np.ndarray]] = {
             "pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
-            "force_n": lambda: -self.normal_force_n[:, None] * down, "torque_nmm": lambda: np.full((steps, 3), np.nan),
+            "force_n": lambda: 0.0 - self.normal_force_n[:, None] * down, "torque_nmm": lambda: np.full((steps, 3), np.nan),
             "expected_error_mm": lambda: np.full(steps, np.nan), "hyperelastic_counts": lambda: np.full((steps, 3), np.nan),
             "validity_reason": lambda: np.full(steps, "", dtype=str)}
         if self.deformation_map_mm is not None:

@@ -141,11 +141,14 @@ class Sensor:
         if not 0 <= coefficient < float("inf"):
             raise InputError(f"friction {coefficient:g}: give a number from 0 on.")
         block, key = ("friction", "object") if self.spec.has_layers else ("contact", "friction")
+        if block not in type(self.spec).model_fields:
+            raise InputError(f"{self.spec.name}, a sensor of kind {self.spec.kind}: it is pressed without friction; leave it out.")
         changed = getattr(self.spec, block).model_copy(update={key: float(coefficient)})
         return replace(self, spec=self.spec.model_copy(update={block: changed}))
 
     def prepared(self, model: str, threads: int = 1) -> Any:
         """Prepared data of a fast model: `Compliance`, `WideLayer` of a gel, or `FoundationCompliance`, computed on first use."""
+        self.spec.need_layers()
         self.spec.check_for(model)
         if model == "foundation":
             self.need_elastic("foundation model")

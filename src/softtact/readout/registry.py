@@ -113,9 +113,10 @@ class Readout(Protocol):
 
 
 def register(kind: str) -> Callable[[_Class], _Class]:
-    """Class decorator: register a readout under the kind that sensors' files name."""
+    """Class decorator: register a readout under the kind that sensors' files name; a user's stays before the package's own."""
     def add(cls: _Class) -> _Class:
-        _KINDS[kind] = cls
+        if kind not in _KINDS or not cls.__module__.startswith("softtact."):     # the package's may be loaded later
+            _KINDS[kind] = cls
         return cls
 
     return add
