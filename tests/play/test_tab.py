@@ -3,6 +3,7 @@
 import threading
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,6 +159,28 @@ def test_a_long_press_is_started_compared_and_leaves_no_files(tab, seen, tmp_pat
     assert words.startswith("elastic, ") and seen.long[0][0] == "elastic: starting"
     np.testing.assert_allclose(result.deformation_map_mm, elastic.result.deformation_map_mm, atol=1e-9)
     wait_for(lambda: not list((tmp_path / "out").iterdir()))
+
+
+def test_a_long_press_that_stopped_is_shown_as_that_and_not_taken_for_the_press(tab, seen, state, solver, monkeypatch):
+    taken, bench = [], tab.solver.bench(state.sensor)
+    reached = solver.solve(state, draft=True).result
+    stopped = SimpleNamespace(running=False, seconds=1.0, stopped="the last step was not reached.", result=lambda: reached,
+                              press=SimpleNamespace(model="elastic"), close=lambda: None)
+    monkeypatch.setattr("softtact.play.tab.LongPress", lambda *_: stopped)
+    monkeypatch.setattr(bench, "models", ("elastic",))
+    monkeypatch.setattr(bench, "take", lambda *pressed: taken.append(pressed))
+    tab.run_long("elastic")
+    wait_for(lambda: any(result is not None for _, result, _ in seen.long))
+    assert seen.long[-1][0] == "elastic, stopped after load step 1: the last step was not reached." and seen.long[-1][2] is None
+    assert not taken and tab._long_of is None
+
+
+def test_the_command_of_a_long_press_says_why_it_stopped(solver, state, tmp_path):
+    long = LongPress(replace(solver.solve(state, draft=True).press, load=-1.0), tmp_path)
+    try:
+        assert "force" in long.stopped and not long.running
+    finally:
+        long.close()
 
 
 def test_a_closed_tab_ends_its_long_press(tab, seen, tmp_path, monkeypatch):

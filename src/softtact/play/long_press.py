@@ -49,10 +49,15 @@ class LongPress:
         lines = self._words.read_text(errors="replace").replace("\r", "\n").split("\n")
         return next((line.strip() for line in reversed(lines) if line.strip()), "starting")
 
+    @property
+    def stopped(self) -> str:
+        """Why it ended before its last load step, in the command's sentence; empty where it was reached."""
+        return self.progress.removeprefix("softtact press: ") if self._process.wait() else ""
+
     def result(self) -> PressResult:
-        """The result after the end. Raises SofttactError with the sentence that the command ended with."""
-        if self._process.wait() and not self._file.exists():
-            raise SofttactError(self.progress.removeprefix("softtact press: "))
+        """The result after the end, of the load steps that were reached. Raises SofttactError, as `stopped`, where none was."""
+        if (why := self.stopped) and not self._file.exists():
+            raise SofttactError(why)
         return read_press(self._file)
 
     def close(self) -> None:

@@ -77,7 +77,7 @@ class Page:
         if result is None:
             self._long_words.content = _plain(words)
             return
-        lines = [f"**{words}**: {result.indentation_mm[-1]:.3f} mm deep{_apart(result, fast)}."]
+        lines = [f"**{_plain(words)}**: {result.indentation_mm[-1]:.3f} mm deep{_apart(result, fast)}."]
         if result.selection_reason:
             lines.append(f"Why this model: {_plain(result.selection_reason)}.")
         lines += [f"Not within validity: {why}." for why in result.validity_reason[-1:] if why]

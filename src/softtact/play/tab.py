@@ -310,6 +310,9 @@ class Tab:
         state, long = self._long_state, self._long
         try:
             result = long.result()
+            if long.stopped:
+                self._view.show_long(f"{result.model}, stopped after load step {result.steps}: {long.stopped}", result, None)
+                return
             self._long_of = state, result
             fast = self.solver.solve(state)
             self.solver.bench(state.sensor).take(long.press, result)
