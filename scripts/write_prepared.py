@@ -4,8 +4,8 @@ and drafts of their elastic layers, for the first map in `softtact play`.
     python scripts/write_prepared.py
 
 Run it after a change of a sensor, of its materials, or of what computes the laws; then `_FORMAT` in softtact/press/cache.py needs a
-new number, too. Files of other values are removed. `pytest -m slow tests/press/test_shipped_models.py` compares the files with laws
-made anew.
+new number, too. Files of other values are removed. tests/press/test_shipped_models.py compares the files with what is made anew:
+small forces and the smaller draft in each run of the tests, all of them with `-m slow`.
 """
 
 import numpy as np
