@@ -82,6 +82,17 @@ def test_the_pad_carries_nothing_where_the_object_rests_before_it_touches():
     np.testing.assert_array_equal(pad_forces(np.array([5.0]), stop_mm=0.1, touch_mm=0.1, depth_of=depth_of), [0.0])
 
 
+def test_an_object_that_stays_above_the_shell_where_its_descent_is_no_longer_found_does_not_rest_on_it():
+    def found_up_to_3_n(force):
+        if force > 3.0:
+            raise ConvergenceError("not settled")
+        return 0.1 * force
+
+    with pytest.raises(ConvergenceError, match="3 N, where the object is still above the shell"):
+        pad_forces(np.array([1.0, 50.0]), stop_mm=0.6, touch_mm=0.0, depth_of=found_up_to_3_n)
+    assert pad_forces(np.array([50.0]), stop_mm=0.2, touch_mm=0.0, depth_of=found_up_to_3_n) == pytest.approx(2.0)
+
+
 def test_a_motion_that_goes_below_the_shell_is_refused_with_both_depths():
     with pytest.raises(ConvergenceError, match=r"Step 2 .* 0\.6 mm deep, but rests on the shell beside the pad after 0\.5 mm"):
         shell().refuse_motion(surface_of(block(14.0, 4.0)), np.zeros(2), 0.6, 0.0, step=2)

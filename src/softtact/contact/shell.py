@@ -16,6 +16,7 @@ from softtact.errors import ConvergenceError
 _BESIDE_MM = 1e-3      # gap to the pad's side: an object that ends at the side does not lie on the shell
 _TOUCHING_MM = 1e-6    # from first touch: an object that rests on the shell within this descent exerts no force on the pad
 _FAR_MM = 10.0         # replaces a depth that was not found
+_RESTS_MM = 0.02       # over the shell's top: height from which on an object does not rest on it yet
 _EXACT = 1e-8          # tolerance of the pad's force where the object rests, relative to the largest force
 
 
@@ -86,6 +87,7 @@ def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_o
     """Forces (l,) in N that the pad carries of rising forces (l,): at most the force at which the object rests on the shell.
 
     stop_mm, touch_mm: descent to the shell and to first touch;  depth_of: descent (mm) under a force (N)
+    Raises ConvergenceError where the object is still above the shell at the largest force whose descent is found.
     """
     if np.isinf(stop_mm):
         return forces_n
@@ -104,4 +106,8 @@ def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_o
         return forces_n
     from scipy.optimize import brentq
 
-    return np.minimum(forces_n, brentq(below, 0.0, largest, xtol=_EXACT * largest))
+    found, beside = brentq(below, 0.0, largest, xtol=_EXACT * largest), 2 * _EXACT * largest
+    if below(found + beside) == _FAR_MM and below(found - beside) < -_RESTS_MM:
+        raise ConvergenceError(f"The force at which the object rests on the shell was not found: the model does not settle beyond "
+                               f"{found:.3g} N, where the object is still above the shell; use smaller forces, or another model.")
+    return np.minimum(forces_n, found)
