@@ -48,6 +48,12 @@ def test_the_inside_of_the_elastomer_moves_with_its_upper_side(skin, pressed):
     np.testing.assert_allclose(pressed.solid.displacement_mm[-1], whole, atol=1e-12)
 
 
+def test_contact_pressure_times_area_is_the_force(skin, pressed):
+    layer = skin.prepared_models["elastic"]
+    of_a_node = layer.layout.area_mm2 / len(layer.layer.mesh.top)
+    np.testing.assert_allclose(np.nansum(pressed.solid.contact_pressure_mpa, axis=(1, 2)) * of_a_node, [0.2, 0.5], rtol=1e-9)
+
+
 def test_a_force_beyond_the_elastomer_leaves_the_result_of_the_forces_before(skin):
     seen = []
     with pytest.raises(ConvergenceError, match=r"^small_skin at 4.5 N: .*twice") as ended:
