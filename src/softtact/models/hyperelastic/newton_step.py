@@ -57,19 +57,21 @@ class StepContact:
         self.projection, self.points = projection, self._slab.linear_gaps(self._state.displacement, projection,
                                                                              self._indentation, self._state.history)
 
-    def frames(self, kept: NodeFrames | None) -> NodeFrames:
+    def frames(self, kept: NodeFrames | None, *, change: np.ndarray | float = 0.0) -> NodeFrames:
         """`NodeFrames` along the contact normals, of the nodes whose contact with the object may change.
 
         kept: earlier frames, whose nodes and numbers of vectors are kept if they suffice for the nodes that may touch soon
+        change (p,): of the points' gaps in mm, so far in the step: points that it brought to the object count, too
         """
-        now = self._frames_within(_SOON_MM, _BENT)
+        gaps = self.points.gaps + np.minimum(change, 0.0)
+        now = self._frames_within(gaps, _SOON_MM, _BENT)
         if kept is not None and kept.covers(now):
             return kept.turned_as(now)
-        return self._frames_within(_NEAR_MM, _SLIGHTLY_BENT)
+        return self._frames_within(gaps, _NEAR_MM, _SLIGHTLY_BENT)
 
-    def _frames_within(self, within_mm, bent):
+    def _frames_within(self, gaps, within_mm, bent):
         """Frames of nodes with smaller gaps; vectors are needed if the squared normals along them exceed the share `bent`."""
-        nodes, normals = self._slab.top.projected_nodes(self.points.gaps, self.projection, within_mm)
+        nodes, normals = self._slab.top.projected_nodes(gaps, self.projection, within_mm)
         unknowns = self._slab.unknowns_of(nodes)
         free = (unknowns >= 0).all(axis=1)
         size, turns = np.linalg.eigh(normals[free])
@@ -109,7 +111,7 @@ class ContactFactor:
     def reset(self) -> None:
         """Nothing is kept between factorisations."""
 
-    def renew(self, problem: "_StepProblem", slope: np.ndarray) -> bool:
+    def renew(self, problem: "_StepProblem", slope: np.ndarray, *, change: np.ndarray | float = 0.0) -> bool:
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
         rows, indentation_increment = problem.points.rows, problem.points.indentation_increment
         border, corner = problem.friction_border
@@ -150,9 +152,12 @@ class DissectedContact:
         """Discard the nodes' frames, which a factorisation otherwise takes from the last one."""
         self._frames, self._points, self._slope = None, None, None
 
-    def renew(self, problem: "_StepProblem", slope: np.ndarray) -> bool:
-        """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
-        self._frames, self._points, self._slope = problem.contact.frames(self._frames), None, None
+    def renew(self, problem: "_StepProblem", slope: np.ndarray, *, change: np.ndarray | float = 0.0) -> bool:
+        """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite.
+
+        change (p,): of the points' gaps in mm, which chooses the nodes whose contact can change without a new factor
+        """
+        self._frames, self._points, self._slope = problem.contact.frames(self._frames, change=change), None, None
         border, corner = problem.friction_border
         column = np.append(np.broadcast_to(border, self.solver.unknowns), corner)
         if not self.solver.factor_bordered(Bordered(upper=problem.rubber, column=column, frames=self._frames)):
@@ -297,7 +302,7 @@ class ContactStepper:
             if not positive:     # the factorisation of this matrix would fail
                 return None
         self.factors += 1
-        self._factored = self.factor.renew(problem, slope)
+        self._factored = self.factor.renew(problem, slope, change=at.change)
         if not self._factored:
             return None
         direction, good, _ = self._conjugate_gradients(problem, slope, -gradient)
