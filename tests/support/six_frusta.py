@@ -17,9 +17,9 @@ def plate(x, y):
     return np.zeros(len(x)), np.tile([0.0, 0.0, -1.0], (len(x), 1))
 
 
-def six_frusta():
-    """The body at rest."""
-    return build_sensor_body(SMALL, dielectric_law=LAW, cover_law=LAW, mesh=COARSE)
+def six_frusta(**changes):
+    """The body at rest; changes: of its specification."""
+    return build_sensor_body(SMALL.model_copy(update=changes), dielectric_law=LAW, cover_law=LAW, mesh=COARSE)
 
 
 def bent(body, *, by_mm, depth_mm):

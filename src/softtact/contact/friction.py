@@ -101,6 +101,11 @@ class FrictionState:
         slip = way if normal is None else way - (way * normal).sum(axis=-1, keepdims=True) * normal
         return FrictionResponse(self, position, slip, normal)
 
+    def at(self, points: np.ndarray) -> "FrictionState":
+        """The friction state of some of the points, or of the points of some bodies."""
+        parts = {name: getattr(self, name)[points] for name in ("anchor", "start", "start_gap", "pressure", "touching", "slid")}
+        return replace(self, **parts)
+
     def halfway(self, other: "FrictionState") -> "FrictionState":
         """`other` with the pressures halfway between both."""
         return replace(other, pressure=0.5 * (self.pressure + other.pressure))

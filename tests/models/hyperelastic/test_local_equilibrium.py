@@ -1,5 +1,7 @@
 """Frusta find their own balance between the steps of the whole sensor: the same as a step of all finds, and nothing else moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -11,6 +13,7 @@ from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic.body import LayeredBody, balanced
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
+from softtact.sensors.frusta import Friction
 
 TOLERANCE_N = 1e-5
 FIRST, THIRD = 0, 2
@@ -70,6 +73,34 @@ def test_a_state_is_the_same_as_one_evaluated_there(body):
     assert now.energy == pytest.approx(anew.energy, rel=1e-12)
     np.testing.assert_allclose(now.force, anew.force, atol=1e-12)
     np.testing.assert_array_equal(now.gaps, anew.gaps)
+
+
+def rubbing(body, *, pressure_mpa):
+    """The support's state with a frustum bent sideways, its tip free to slide against a friction of this pressure."""
+    state = bent(body, by_mm={THIRD: 0.03})
+    touched = body.friction.begin_step(state).support
+    board = replace(touched.friction, pressure=np.full_like(touched.friction.pressure, pressure_mpa),
+                    touching=np.ones_like(touched.friction.touching))
+    return body.support.reevaluate_contact(state.support, touched.held_by(board))
+
+
+@pytest.mark.parametrize("pressure_mpa", [0.0, 0.01, 1.0])
+def test_a_frustum_that_may_slide_finds_its_balance_against_friction(pressure_mpa):
+    """Friction of a constant pressure has a potential, which falls with the others; a state evaluated there is the same.
+
+    Where the tip slides, steps cross the slip tolerance: six leave some thousandths of the force, for the next step of all.
+    """
+    body = six_frusta.six_frusta(tips_bonded=False, friction=Friction(board=0.3))
+    state = rubbing(body, pressure_mpa=pressure_mpa)
+    np.testing.assert_allclose(body.support.potentials(state.displacement, state.elastic, np.arange(6), state.history).sum(),
+                               state.energy, rtol=1e-12)
+    now, moved = balanced(body.support, state, TOLERANCE_N)
+    anew = body.support.evaluate(now.displacement, state.history)
+    body.close()
+    np.testing.assert_array_equal(moved, [THIRD])
+    assert unbalanced(body.support, now).max() <= 0.01 * unbalanced(body.support, state).max() and now.energy < state.energy
+    assert now.energy == pytest.approx(anew.energy, rel=1e-12)
+    np.testing.assert_allclose(now.force, anew.force, atol=1e-12)
 
 
 def test_steps_too_long_are_halved_until_the_energy_of_each_frustum_falls(body, monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 from support.plates import plate
+from support.sensors import CORO
 from support.six_frusta import six_frusta
 
 from softtact.linalg.direct import make_solver
@@ -37,7 +38,7 @@ class Pressed:
         turns = Rotation.random(len(top), rng=rng).as_matrix()
         also = np.array([UNKNOWNS - 1]) if others else np.zeros(0, dtype=np.int64)
         frames = NodeFrames(first=3 * top, turns=turns, wanted=np.ones(len(top), dtype=np.int64), others=also)
-        self.contact = SimpleNamespace(frames=lambda kept: frames)
+        self.contact = SimpleNamespace(frames=lambda kept, change=0.0: frames)
         # A point lies between two nodes, and sees each along the direction that the node keeps for it.
         size = (len(frames.last),) * 2
         share = rng.uniform(0.2, 0.8, size) * (rng.random(size) < 0.1)
@@ -150,7 +151,8 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         if general:
             body.stepper.factor = ContactFactor(make_solver())
         else:
-            monkeypatch.setattr(StepContact, "frames", lambda *a, find=StepContact.frames: frames.append(find(*a)) or frames[-1])
+            find = StepContact.frames
+            monkeypatch.setattr(StepContact, "frames", lambda *a, **k: frames.append(find(*a, **k)) or frames[-1])
         settings = NewtonSettings(relative_tolerance=1e-8)
         ends.append([load_step.state for load_step in press_load_steps(body, ball, [0.3, 1.0, 2.0], settings=settings)])
         body.close()
@@ -161,6 +163,33 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         np.testing.assert_allclose(one.slab.displacement, other.slab.displacement, atol=3e-6)
 
 
+def test_nodes_that_a_step_brings_to_the_object_are_left_to_the_last_as_well():
+    """Chosen at the step's start alone, they would stand outside: each change of their contact would need a new factor."""
+    body = six_frusta()
+    rest, _ = body.rest()
+    planes = body.slab.project(rest, ball)
+    above, touching = (StepContact(body.slab, body.slab.evaluate(rest, planes, depth), depth) for depth in (-0.3, 0.02))
+    lowered = 0.32 * above.points.indentation_increment
+    found, expected = above.frames(None, change=lowered), touching.frames(None)
+    body.close()
+    assert not len(above.frames(None).last) and len(expected.last)
+    np.testing.assert_array_equal(found.last, expected.last)
+
+
+def tilted_plate(x, y):
+    """A plate over everything, 3 degrees from level: its contact grows across the sensor, beyond the nodes near it at first."""
+    return 0.05 * (x + 8.0), np.tile(np.array([0.05, 0.0, -1.0]) / np.hypot(0.05, 1.0), (len(x), 1))
+
+
+def test_a_contact_that_grows_far_within_a_step_takes_few_factors():
+    """Two load steps of five iterations: 4 factors (25 where nodes are chosen by their gaps at a step's start)."""
+    body = six_frusta(footprint_mm=(12.0, 7.2), edge=CORO.edge)
+    load_steps = list(press_load_steps(body, tilted_plate, [5.0, 20.0], settings=NewtonSettings()))
+    factors = body.stepper.factors
+    body.close()
+    assert factors <= sum(load_step.iterations for load_step in load_steps)
+
+
 def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
     body = six_frusta()
     rest, _ = body.rest()
@@ -169,7 +198,7 @@ def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
                       for facing in (planes, replace(planes, normals=turn.apply(planes.normals))))
     kept = before.frames(None)
     now = turned.frames(kept)
-    soon = turned._frames_within(newton_step._SOON_MM, newton_step._BENT)
+    soon = turned._frames_within(turned.points.gaps, newton_step._SOON_MM, newton_step._BENT)
     body.close()
     np.testing.assert_array_equal(now.last, kept.last)
     touched = np.isin(now.first, soon.first)

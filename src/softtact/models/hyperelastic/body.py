@@ -229,11 +229,10 @@ class LayeredBody:
     def balanced(self, state: BodyState, tolerance_n: float) -> BodyState:
         """The state with each frustum in local equilibrium, if only frusta are out of balance.
 
-        A frustum that rocks or folds takes separate steps, unless sheet or cover are out of balance too. With friction on the
-        board there are no separate steps, as the friction state is updated for all frusta together.
+        A frustum that rocks, folds or slides takes separate steps, unless sheet or cover are out of balance too.
         """
         rest = max(tolerance_n, self._slab_residual(state))
-        if self.support.friction is not None or self._support_residual(state) <= rest:
+        if self._support_residual(state) <= rest:
             return state
         support, moved = balanced(self.support, state.support, tolerance_n, workers=self.workers)
         self.cells.forget(moved)

@@ -215,9 +215,13 @@ class FrustumArray(Support):
         return body.energies.reshape(len(displacement), -1).sum(axis=1), force
 
     def potentials(self, displacement: np.ndarray, elastic: tuple, frusta: np.ndarray, history: ContactHistory) -> np.ndarray:
-        """Energies (k,) in mJ of the given frusta with their contacts, from those of `rubber`; without friction."""
+        """Energies (k,) in mJ of the given frusta with their contacts and friction, from those of `rubber`."""
         energy, _, _ = history.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
-        return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
+        total = elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
+        if history.friction is None:
+            return total
+        response = history.friction.at(frusta).friction_response(self._on_board(displacement, frusta))
+        return total + (response.energy * self.point_area[frusta, :self.board_points]).sum(axis=1)
 
     def reevaluate_contact(self, state: SupportState, history: ContactHistory) -> SupportState:
         """The same displacements with another history of the contacts."""
@@ -246,9 +250,9 @@ class FrustumArray(Support):
         b = self.board_points
         return self.point_nodes[:b], self.point_weights[:b], np.full(b, axis)
 
-    def _on_board(self, displacement):
-        """Positions (n, b, 2) of the points in the board's plane."""
-        position = self.coordinates + displacement
+    def _on_board(self, displacement, frusta=...):
+        """Positions (n, b, 2) of the points in the board's plane, of all frusta or of some."""
+        position = self.coordinates[frusta] + displacement
         return np.stack([weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
     def first_friction_state(self, state: SupportState) -> FrictionState | None:
