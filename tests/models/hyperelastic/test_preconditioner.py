@@ -151,8 +151,8 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         if general:
             body.stepper.factor = ContactFactor(make_solver())
         else:
-            find = StepContact.frames
-            monkeypatch.setattr(StepContact, "frames", lambda *a, **k: frames.append(find(*a, **k)) or frames[-1])
+            monkeypatch.setattr(StepContact, "frames",
+                                lambda *a, find=StepContact.frames, **k: frames.append(find(*a, **k)) or frames[-1])
         settings = NewtonSettings(relative_tolerance=1e-8)
         ends.append([load_step.state for load_step in press_load_steps(body, ball, [0.3, 1.0, 2.0], settings=settings)])
         body.close()
