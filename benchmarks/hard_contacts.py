@@ -4,11 +4,11 @@
 
 Plugs, walls, boxes and rods, hollow and thin, one to three of them at two heights, tilted by up to 45 degrees, anywhere over the
 sensor, its sides and corners included; draft mesh, load steps 5, 10 and 20 N, or up to the force from which frusta may be crushed.
-A press counts as reached within 360 seconds of the processor, three minutes of two cores, with each load step valid, and as crushed
-if a load step that was not foretold to crush frusta is flagged for that, and those before it are valid: it reached the force that
-crushes. One that is neither has been told if it ended within 60 seconds, or was foretold. Work on the solver with the set `trial` alone: after its last
-change take a new SEED, so that nobody has seen the contacts on which it is judged. The run goes on from where the record ends;
-record: benchmarks/results/hard_contacts.json.
+A press counts as reached within 360 seconds of the processor, three minutes of two cores, with each load step valid, and as
+crushed if a load step that was not foretold to crush frusta is flagged for that, and those before it are valid: it reached the
+force that crushes. One that is neither has been told if it ended within 60 seconds, or was foretold. Work on the solver with
+the set `trial` alone: after its last change take a new SEED, so that nobody has seen the contacts on which it is judged. The
+run goes on from where the record ends; record: benchmarks/results/hard_contacts.json.
 """
 
 import argparse
@@ -89,7 +89,8 @@ def outcome(sensor, mesh, pose):
         row |= {"reached_n": round(float(result.normal_force_n[-1]), 2),
                 "least_volume_ratio": round(float(result.least_volume_ratio.min()), 3)}
     row["processor_s"] = round(time.process_time() - start, 1)
-    row["told"] = row["outcome"] not in ("reached", "crushed") and (row["processor_s"] <= TOLD_S or row.get("crushed_from_n") is not None)
+    told = row["processor_s"] <= TOLD_S or row.get("crushed_from_n") is not None
+    row["told"] = row["outcome"] not in ("reached", "crushed") and told
     return row
 
 
