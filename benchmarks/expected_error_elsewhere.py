@@ -56,7 +56,7 @@ def sensor_of(name):
 
 def contact(number):
     """Name of the sensor, and (kind, mesh in mm, place) of a contact."""
-    rng, name = np.random.default_rng([number, 23]), list(SENSORS)[number % len(SENSORS)]
+    rng, name = np.random.default_rng([number, 24]), list(SENSORS)[number % len(SENSORS)]
     kind = ("ball", "box", "punch", "ridges")[number // len(SENSORS) % 4]
     if kind == "ball":
         mesh = trimesh.creation.icosphere(subdivisions=4, radius=float(rng.uniform(3, 20)))
