@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,3 +48,12 @@ def test_the_record_counts_a_flagged_press_as_not_reached(benchmark):
     rows = [{"outcome": "reached", "told": False}, {"outcome": "flagged", "told": True}, {"outcome": "late", "told": False}]
     found = benchmark.summary(rows)
     assert found["reached"] == 1 and found["share"] == 0.333 and found["told_of_the_rest"] == 1
+
+
+@pytest.mark.parametrize(("valid", "reasons", "crushed"), [
+    ([1, 1, 0], ["", "", "a frustum is compressed by 90 %, when its pocket is full; frusta fold on under the same force"], True),
+    ([1, 0, 0], ["", "surfaces overlap", "a frustum is compressed by 90 %, when its pocket is full"], False),
+    ([1, 1, 0], ["", "", "a frustum is compressed by 90 %, when its pocket is full; an element of the cover is folded"], False),
+    ([1, 1, 0], ["", "", "frusta fold on under the same force"], False)])
+def test_frusta_are_crushed_where_the_last_load_step_alone_is_flagged_for_nothing_else(benchmark, valid, reasons, crushed):
+    assert benchmark.crushed_last(SimpleNamespace(within_validity=np.array(valid), validity_reason=np.array(reasons))) is crushed
