@@ -14,12 +14,14 @@ import pytest
 import trimesh
 from support.sensors import CORO
 
+from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import ContactSettings, press_elastic
 from softtact.errors import InputError, ShellWarning
 from softtact.models.elastic import compliance as elastic
 from softtact.models.elastic.gradient import PressedLayer
 from softtact.models.quarter_symmetry import ParityBlocks
 from softtact.press import gradient
+from softtact.press.objects import target_of
 from softtact.press.sensor import Sensor
 from softtact.sensors.fields import CalibrationBlock
 from softtact.sensors.specification import spec_from_dict
@@ -171,15 +173,16 @@ def test_the_active_set_stays_within_the_margin_and_changes_beyond_it(sensor, ti
 def test_the_margin_by_young_ends_where_a_point_loses_its_force_too(sensor, tight):
     """Forces and gaps change with the modulus as those of stiffer and softer layers do, and the margin is the nearest point's."""
     result, compliance, young = pressed(sensor), sensor.prepared_models["elastic"], SMALL.elastic_layer.young_mpa
-    points, press = gradient._pressed_layer(result, compliance, result.origin.underside)
-    layer, by = PressedLayer(compliance, points, press), 1e-6 * young
+    surface = underside_of(result.origin.underside.triangles, target_of(sensor, compliance.grid))
+    points, contact = elastic.touch_object(compliance, surface, np.array(FORCES))
+    layer, by = PressedLayer(compliance, points, contact), 1e-6 * young
     found = layer.by_young(young, layer.by_force())
     upper, lower = (elastic.press_layer(stiffer(sensor, sign * by).prepared_models["elastic"], points, FORCES).contact
                     for sign in (1, -1))
     force, gap = ((getattr(upper, name) - getattr(lower, name)) / (2 * by) for name in ("force", "gap"))
     np.testing.assert_allclose(found.force[0], force, rtol=0, atol=1e-5 * np.abs(force).max())
-    touching = press.contact.force > 0
-    nearest = (np.where(touching, press.contact.force, press.contact.gap) / np.abs(np.where(touching, force, gap))).min(axis=0)
+    touching = contact.force > 0
+    nearest = (np.where(touching, contact.force, contact.gap) / np.abs(np.where(touching, force, gap))).min(axis=0)
     assert found.margin[0] == pytest.approx(nearest, rel=1e-3)
 
 

@@ -84,6 +84,11 @@ class HeightField:
         normal[hit] = self.normals[triangles[hit]]
         return normal
 
+    def slopes_of(self, triangles: np.ndarray) -> np.ndarray:
+        """Derivatives (n, 2) by x and y of the heights of triangles (n,), zero for -1."""
+        normals = self.normals_of(triangles)
+        return -normals[:, :2] / normals[:, 2:]
+
     def first_touch_mm(self, x_mm: np.ndarray, y_mm: np.ndarray) -> float:
         """Height (mm) of the underside's lowest point over a sensor whose map has columns x_mm and rows y_mm, edges included.
 

@@ -20,15 +20,17 @@ Rates = Callable[[np.ndarray], np.ndarray]     # velocities (k, n, 3) of an obje
 def gap_rates(surface: HeightField, grid: NodeGrid, points: ObjectPoints, rates: Rates) -> np.ndarray:
     """Derivatives (k, c) of the gaps of an object's points by the k numbers of `rates`.
 
-    Beside an edge a node has the plane of a facet (`Underside`), which it follows as far as its slope is kept there.
+    Beside an edge a node has the plane of a facet (`Underside`), which it follows as far as its slope is kept there; all others
+    follow the facet over them.
     """
     places = np.column_stack([grid.points[points.nodes], points.gap])
-    over_facet, _ = surface.over_lines(grid.x, grid.y)
+    over_facet, triangles = surface.over_lines(grid.x, grid.y)
+    slope = surface.slopes_of(triangles.ravel()[points.nodes])
     narrow = points.gap < over_facet.ravel()[points.nodes]
-    narrow[points.edge] = False
+    slope[points.edge], narrow[points.edge] = points.slope[points.edge], False
     if narrow.any():
-        places[narrow] = _lowest_at(surface, grid, points.nodes[narrow], points.gap[narrow])
-    return _height_rates(rates(places), points.slope)
+        places[narrow], slope[narrow] = _lowest_at(surface, grid, points.nodes[narrow], points.gap[narrow]), 0.0
+    return _height_rates(rates(places), slope)
 
 
 def touch_rates(surface: HeightField, x_mm: np.ndarray, y_mm: np.ndarray, rates: Rates) -> np.ndarray:
@@ -37,8 +39,7 @@ def touch_rates(surface: HeightField, x_mm: np.ndarray, y_mm: np.ndarray, rates:
     touch = surface.first_touch_mm(x_mm, y_mm)
     if heights.min() <= touch < NO_CONTACT_MM:
         j, i = np.unravel_index(heights.argmin(), heights.shape)
-        normal = surface.normals_of(triangles[j, i])
-        return _height_rates(rates(np.array([[x_mm[i], y_mm[j], touch]])), -normal[None, :2] / normal[2])[:, 0]
+        return _height_rates(rates(np.array([[x_mm[i], y_mm[j], touch]])), surface.slopes_of(triangles[[j], [i]]))[:, 0]
     corners = surface.triangles.reshape(-1, 3)
     over = (np.abs(corners[:, :2]) <= [x_mm[-1], y_mm[-1]]).all(axis=1) & (corners[:, 2] == touch)
     return rates(corners[over][:1])[:, 0, 2]

@@ -36,7 +36,7 @@ class Underside:
     def __init__(self, surface: HeightField, grid: NodeGrid) -> None:
         self._surface, self._grid = surface, grid
         self._coarse, over_node = _sampled(surface, grid)
-        self._height, self._slope = self._coarse[:, 4], _slopes(surface, over_node)
+        self._height, self._slope = self._coarse[:, 4], surface.slopes_of(over_node)
         self.lowest_mm = min(float(self._coarse.min()), surface.first_touch_mm(grid.x, grid.y))
         if self.lowest_mm >= NO_CONTACT_MM:
             raise InputError(MISSES)
@@ -105,7 +105,7 @@ class Underside:
         places, at = _lowest_samples(heights)
         number = triangles.reshape(-1, np.prod(triangles.shape[1:]))[np.arange(len(near)), at]
         height = heights_of(self._surface.triangles, number, *(self._grid.points[near] + places * self._grid.step).T)
-        over_lowest = self._above(heights, places, height, _slopes(self._surface, number))
+        over_lowest = self._above(heights, places, height, self._surface.slopes_of(number))
         still = np.zeros((len(near), 2))
         tolerance = _FLAT * self._grid.step.min()
         above, lowest = (hat_shares(np.abs(found[2]), still, tolerance) for found in (over_node, over_lowest))
@@ -152,12 +152,6 @@ def _sampled(surface, grid):
     heights, triangles = (values.reshape(len(grid.y), 3, len(grid.x), 3).swapaxes(1, 2).reshape(grid.count, 9)
                           for values in surface.over_lines(*lines))
     return heights, triangles[:, 4]
-
-
-def _slopes(surface, triangles):
-    """Derivatives (n, 2) by x and y of the heights of triangles (n,), zero for -1."""
-    normals = surface.normals_of(triangles)
-    return -normals[:, :2] / normals[:, 2:]
 
 
 def _lowest_samples(heights):

@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from softtact.compiled import compiled
+from softtact.contact.height_field import HeightField
 from softtact.contact.lower_envelope import (
     NO_CONTACT_MM,
     facing_down,
@@ -51,6 +52,10 @@ class ObjectSurface:
         except InputError:
             check_over_sensor(place(self.mesh, pose=pose), target.footprint_mm)      # says where it is
             raise
+
+    def height_field(self, pose: Pose | None) -> HeightField:
+        """Its underside in a pose, None for the centred one, with its facets."""
+        return HeightField(trimesh.Trimesh((pose or self.centred).apply(self._points), self._facets, process=False))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,12 +24,14 @@ from softtact.models.elastic.batch import press_layers
 from softtact.models.elastic.compliance import Compliance
 from softtact.press.choice import with_expected_error
 from softtact.press.fast import elastic_result
-from softtact.press.making import RESTS, target_of
+from softtact.press.making import RESTS
+from softtact.press.objects import target_of
 from softtact.press.result import PressResult
 from softtact.press.task import checked_forces, cores
 from softtact.press.validity import flag_buried
 
 if TYPE_CHECKING:
+    from softtact.press.gradient import Gradient
     from softtact.press.sensor import Sensor
 
 _AT_ONCE = {"cpu": 128, "cuda": 4096}     # load steps
@@ -68,6 +71,34 @@ class PressBatch:
     """(n,) texts: why not, several reasons joined by "; ", or the sentence of the error; empty where valid."""
     errors: Mapping[int, SofttactError]
     """By the number of each press that failed; the others are not affected."""
+    origin: "BatchOrigin | None" = field(default=None, repr=False, compare=False)
+    """The sensor, the objects and their poses, for `gradient`; not sent to other processes."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"origin": None}      # whose sensor holds hundreds of megabytes
+
+    def gradient(self, of: str = "tactile_map", by: str | Sequence[str] = ("pose", "force")) -> "Gradient":
+        """Derivatives of the settled contacts, as of `PressResult.gradient`: a `Gradient` with a row for each press.
+
+        The rows of presses without a gradient (failed, on the shell) are nan, and its `errors` say why. Raises InputError for
+        unknown names, and for a batch that comes from another process or was pressed on a gel.
+        """
+        from softtact.press import gradient
+
+        return gradient.gradient_of_batch(self, of, by)
+
+
+@dataclass(frozen=True)
+class BatchOrigin:
+    """What a batch was of, for its gradient."""
+
+    sensor: "Sensor"
+    model: str
+    """elastic or foundation."""
+    surfaces: Sequence[ObjectSurface]
+    """An object for each press."""
+    poses: Sequence[Any]
+    """Its pose, as it was given."""
 
 
 def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurface], poses: np.ndarray | Sequence[Any],
@@ -81,9 +112,9 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
     """
     if isinstance(sensor, str | Path):
         raise InputError(f"press_batch: {str(sensor)!r} is a name; give softtact.load_sensor({str(sensor)!r}), loaded once.")
-    poses = _listed(poses)
-    every = _objects(surfaces, len(poses))
-    forces = _forces(force_n, len(poses))
+    listed = _listed(poses)
+    every = _objects(surfaces, len(listed))
+    forces = _forces(force_n, len(listed))
     checked_forces(np.unique(forces).tolist(), sensor.spec.force_range_n, sensor.spec.name)
     press: Callable[..., Iterator[Any]]
     if model == "elastic" and together(sensor):
@@ -92,19 +123,20 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
         press = _pressed_in_turn
     else:
         raise InputError(f"model={model!r}: a batch is pressed by the elastic or the foundation model; use Sensor.press_many.")
-    batch = _Batch(sensor, len(poses))
-    for numbers, found in press(sensor, every, poses, forces[:, None], model=model, device=device):
+    batch = _Batch(sensor, len(listed))
+    for numbers, found in press(sensor, every, listed, forces[:, None], model=model, device=device):
         batch.take(numbers, found)
     warn_of_shells(sensor, batch.arrays["normal_force_n"], batch.arrays["pad_force_n"])
-    return batch.finished()
+    far = sensor.spec.has_layers and sensor.spec.edge.far
+    return batch.finished(None if far else BatchOrigin(sensor, model, every, listed))
 
 
 def _listed(poses):
-    """The poses as a sequence."""
+    """The poses as a sequence, which later changes of an array leave as it is."""
     if isinstance(poses, np.ndarray) and poses.shape[1:] != (6,):
         raise InputError(f"press_batch: the poses have the shape {poses.shape}; give an array (n, 6) of x, y, z in mm and rx, ry, "
                          "rz in degrees.")
-    poses = list(poses) if isinstance(poses, Iterable) and not isinstance(poses, str) else [0.0]
+    poses = [copy(pose) for pose in poses] if isinstance(poses, Iterable) and not isinstance(poses, str) else [0.0]
     if any(np.isscalar(pose) for pose in poses):
         raise InputError("press_batch: the poses are not a list of poses; give an array (n, 6) of x, y, z in mm and rx, ry, rz in "
                          "degrees, also for one press.")
@@ -187,10 +219,11 @@ class _Batch:
         if self.counts is not None:
             self.counts[numbers] = found.tactile_map
 
-    def finished(self):
+    def finished(self, origin):
         flags = {name: self.arrays[name] > 0 for name in ("converged", "within_validity")}
         reasons = np.array(self.arrays["validity_reason"].tolist(), dtype=str)
-        return PressBatch(**self.arrays | flags | {"validity_reason": reasons}, tactile_map=self.counts, errors=self.errors)
+        return PressBatch(**self.arrays | flags | {"validity_reason": reasons}, tactile_map=self.counts, errors=self.errors,
+                          origin=origin)
 
 
 def _pressed_in_turn(sensor, surfaces, poses, forces_n, *, model, device):

@@ -20,7 +20,8 @@ from softtact.models.elastic.compliance import LayerPress, press_object
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.cache import cached_surface_compliance
-from softtact.press.making import make_result, shell_of, target_of, warn_of_shell
+from softtact.press.making import make_result, warn_of_shell
+from softtact.press.objects import shell_of, target_of
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
 from softtact.press.validity import flagged, flags_elastic, flags_foundation

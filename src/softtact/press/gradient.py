@@ -1,14 +1,16 @@
-"""`PressResult.gradient`: how maps and depth of a press change with pose, force, stiffness and thickness.
+"""`PressResult.gradient` and `PressBatch.gradient`: how maps and depth change with pose, force, stiffness and thickness.
 
 The settled contact is differentiated with its points under pressure held (`models.elastic.gradient`, `models.foundation.gradient`),
 the heights of the object by the facets over the points (`contact.height_rates`), and the readout by its formulas
-(`readout.capacitance_rates`). The result keeps no matrices: contact and compliance are found again from its sensor and object.
-The rates by thickness come from the compliances of two sensors, 1 % thinner and thicker, which are kept in the user's cache.
+(`readout.capacitance_rates`). Results keep no matrices: contact and compliance are found again from sensor and object. Presses of a
+batch are differentiated one after the other: one product with the compliance for all takes longer than one for each, which reads
+the part about its contact alone. The rates by thickness come from the compliances of two sensors, 1 % thinner and thicker, which
+are kept in the user's cache.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,23 +18,27 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.height_rates import gap_rates, touch_rates
 from softtact.contact.object_points import ObjectPoints
 from softtact.contact.underside import Underside
+from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
-from softtact.errors import InputError
-from softtact.models.elastic.compliance import press_layer
+from softtact.errors import ConvergenceError, InputError, SofttactError
+from softtact.geometry.pose import Pose
+from softtact.models.elastic.compliance import touch_object
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
 from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places
 from softtact.models.foundation.gradient import Balance, Tangent
 from softtact.models.foundation.solve import FoundationMaps, settled_contacts
 from softtact.press.cache import cached_compliance, cached_foundation
-from softtact.press.objects import Origin
+from softtact.press.objects import target_of
 from softtact.readout.capacitance import felt_displacement
-from softtact.readout.capacitance_rates import counts_rates, felt_rates
+from softtact.readout.capacitance_rates import counts_rates, felt_with_rates
 from softtact.readout.taxels import Capacitance, counts_of
 from softtact.unknown_names import unknown
 
 if TYPE_CHECKING:
+    from softtact.press.batch import PressBatch
     from softtact.press.result import PressResult
+    from softtact.press.sensor import Sensor
 
 _POSE = {"x": "mm", "y": "mm", "rx": "degree", "ry": "degree", "rz": "degree"}
 _UNITS = _POSE | {"force": "N", "young": "MPa", "thickness": "mm"}
@@ -44,12 +50,15 @@ _RESTING = 1e-6     # of a force: largest share on the shell
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivatives of a press by its parameters, at each load step, the points under pressure held."""
+    """Derivatives by parameters of a press at each load step, or of each press of a batch, the points under pressure held.
+
+    Where shapes say step, a batch has its presses.
+    """
 
     of: str
     """What is differentiated: tactile_map, deformation_map or depth."""
     values: np.ndarray
-    """(step, row, column, parameter) of a map, (step, parameter) of the depth, in `units`."""
+    """(step, row, column, parameter) of a map, (step, parameter) of the depth, in `units`; nan for a press without a gradient."""
     parameters: tuple[str, ...]
     """Names: x, y, rx, ry, rz, force, young, thickness."""
     units: tuple[str, ...]
@@ -57,6 +66,8 @@ class Gradient:
     active_set_margin: np.ndarray
     """(step, parameter) in the parameter's unit: by how much it can change alone, to either side, until a point of the surface
     gains or loses contact. Within it the contact is linear; beyond it the derivative changes by the share of single points."""
+    errors: Mapping[int, SofttactError] = field(default_factory=dict)
+    """By the number of each press of a batch that has no gradient: it failed, rests on the shell, or did not settle."""
 
     def __getitem__(self, parameter: str) -> np.ndarray:
         """The derivative (step, ...) by one parameter. Raises InputError for an unknown one."""
@@ -76,21 +87,69 @@ class Gradient:
         return product.sum(axis=tuple(range(1, product.ndim - 1)))
 
 
-def gradient(result: "PressResult", of: str, by: Sequence[str]) -> Gradient:
+@dataclass(frozen=True)
+class SettledPress:
+    """What a gradient needs of a press by l forces, or of one of a batch: its results, and what its contact is found again from."""
+
+    sensor: "Sensor"
+    model: str
+    surface: Callable[[], HeightField]
+    """The object's underside in its pose; found again, as it takes more memory than a result."""
+    pose: Pose
+    normal_force_n: np.ndarray
+    pad_force_n: np.ndarray
+    shell_force_n: np.ndarray
+    indentation_mm: np.ndarray
+    """These (l,)."""
+    thinning_map_mm: np.ndarray
+    """(l, ny, nx)."""
+
+    def velocities(self, points: np.ndarray) -> np.ndarray:
+        """Velocities (5, n, 3) of the object's points (n, 3) by the numbers of its pose that count."""
+        return self.pose.rates(points)[_OF_POSE]
+
+
+def gradient(result: "PressResult", of: str, by: str | Sequence[str]) -> Gradient:
     """See `PressResult.gradient`."""
     names = _parameters(of, by)
-    _check(result, of)
-    rates = _DIFFERENTIATED[result.model](result, names)
-    values = {"depth": lambda: rates.depth, "deformation_map": lambda: rates.maps, "tactile_map": lambda: rates.counts}[of]()
-    units = _UNITS | ({"young": "1"} if result.model == "foundation" else {})
-    return Gradient(of, np.moveaxis(values, 0, -1), tuple(names), tuple(f"{_OF[of]}/{units[name]}" for name in names),
-                    rates.margin.T)
+    press = _settled(result)
+    _check_taxels(press.sensor, of)
+    _check_contact(press)
+    return _gradient(press.model, of, names, *_DIFFERENTIATED[press.model](press, of, names))
+
+
+def gradient_of_batch(batch: "PressBatch", of: str, by: str | Sequence[str]) -> Gradient:
+    """See `PressBatch.gradient`."""
+    names, origin = _parameters(of, by), batch.origin
+    if origin is None:
+        raise InputError("This batch does not know its sensor and objects, which a gradient needs: it comes from another process, "
+                         "or was pressed on a gel; press again with press_batch.")
+    _check_taxels(origin.sensor, of)
+    rows: Any = {"tactile_map": batch.tactile_map, "deformation_map": batch.deformation_map_mm, "depth": batch.indentation_mm}[of]
+    values, margin = np.full((len(names), *rows.shape), np.nan), np.full((len(names), len(rows)), np.nan)
+    errors = dict(batch.errors)
+    for number in map(int, np.flatnonzero(batch.converged)):
+        try:
+            press = _row(batch, number)
+            _check_contact(press)
+            values[:, [number]], margin[:, [number]] = _DIFFERENTIATED[origin.model](press, of, names)
+        except (ConvergenceError, InputError) as error:
+            errors[number] = error.with_traceback(None)
+    return _gradient(origin.model, of, names, values, margin, dict(sorted(errors.items())))
+
+
+def _gradient(model, of, names, values, margin, errors=None):
+    """The `Gradient` of values (k, step, ...) and margins (k, step) by the parameters of k names."""
+    units = _UNITS | ({"young": "1"} if model == "foundation" else {})
+    return Gradient(of, np.moveaxis(values, 0, -1), tuple(names), tuple(f"{_OF[of]}/{units[name]}" for name in names), margin.T,
+                    errors or {})
 
 
 def _parameters(of, by):
     """Names of the single parameters in `by`; refuses unknown names and those that have no gradient."""
     if of not in list(_OF):
         raise InputError(f"gradient(of={of!r}): {unknown(of, list(_OF), kind='quantity with a gradient')}")
+    by = [by] if isinstance(by, str) else by
     if isinstance(by, int | float | None) or not len(by := list(by)):
         raise InputError(f"gradient(by={by!r}): name at least one parameter of: {', '.join(['pose', *_UNITS])}.")
     for name in by:
@@ -102,100 +161,52 @@ def _parameters(of, by):
     return list(dict.fromkeys(single for name in by for single in (_POSE if name == "pose" else [name])))
 
 
-def _check(result, of):
-    """Refuse a press without a gradient, with the reason and a remedy."""
+def _settled(result):
+    """The `SettledPress` of a result; refuses one of another model or of unknown origin."""
+    origin = result.origin
     if result.model not in _DIFFERENTIATED:
         raise InputError(f"The {result.model} model has no gradients; press with model='elastic' or 'foundation'.")
-    if result.origin is None:
+    if origin is None:
         raise InputError("This result does not know its sensor and object, which a gradient needs: it was read from a file, "
-                         "pressed in a batch, along a motion, over time or on a gel; press again with Sensor.press and force_n.")
-    if hash(result.origin.mesh) != result.origin.mesh_hash:
+                         "pressed by press_many, along a motion, over time or on a gel; press again with Sensor.press and force_n, "
+                         "or with press_batch.")
+    if hash(origin.mesh) != origin.mesh_hash:
         raise InputError("The object's mesh was changed after the press, so its contact is not that of this result any more; press "
                          "again, and change copies of a mesh.")
-    if (untouched := np.flatnonzero(result.pad_force_n <= 0)).size:
-        raise InputError(f"At {result.normal_force_n[untouched[0]]:g} N the object rests on the shell and touches nothing of the "
+    return SettledPress(origin.sensor, result.model, lambda: origin.underside, origin.pose, result.normal_force_n,
+                        result.pad_force_n, result.shell_force_n, result.indentation_mm, result.thinning_map_mm)
+
+
+def _row(batch, number):
+    """The `SettledPress` of one of a batch."""
+    origin, row = batch.origin, slice(number, number + 1)
+    surface, pose = origin.surfaces[number], Pose.of(origin.poses[number])
+    force_n, pad_force_n = batch.normal_force_n[row], batch.pad_force_n[row]
+    return SettledPress(origin.sensor, origin.model, lambda: surface.height_field(pose), pose or surface.centred, force_n,
+                        pad_force_n, force_n - pad_force_n, batch.indentation_mm[row], batch.thinning_map_mm[row])
+
+
+def _check_contact(press):
+    """Refuse a press without a gradient, with the reason and a remedy."""
+    if (untouched := np.flatnonzero(press.pad_force_n <= 0)).size:
+        raise InputError(f"At {press.normal_force_n[untouched[0]]:g} N the object rests on the shell and touches nothing of the "
                          "pad, so there is no gradient; give a narrower object, or another pose.")
-    if (resting := np.flatnonzero(result.shell_force_n > _RESTING * result.normal_force_n)).size:
-        raise InputError(f"At {result.normal_force_n[resting[0]]:g} N the object rests on the shell beside the pad, where the "
+    if (resting := np.flatnonzero(press.shell_force_n > _RESTING * press.normal_force_n)).size:
+        raise InputError(f"At {press.normal_force_n[resting[0]]:g} N the object rests on the shell beside the pad, where the "
                          "pad's force no longer follows; ask for gradients of smaller forces.")
-    if of == "tactile_map" and not isinstance(result.origin.sensor.readouts.get("taxels"), Capacitance):
-        raise InputError(f"{result.sensor} has no readout 'taxels' of kind capacitance, whose gradient this is; take "
+
+
+def _check_taxels(sensor, of):
+    """Refuse counts of a sensor whose taxels are none, or not read by capacitance."""
+    if of == "tactile_map" and not isinstance(sensor.readouts.get("taxels"), Capacitance):
+        raise InputError(f"{sensor.spec.name} has no readout 'taxels' of kind capacitance, whose gradient this is; take "
                          "of='deformation_map'.")
 
 
-@dataclass(frozen=True)
-class _Rates:
-    """Rates by k parameters: depth (k, l), maps (k, l, y, x) in mm, counts (k, l, rows, columns), margin (k, l)."""
-
-    depth: np.ndarray
-    maps: np.ndarray
-    margin: np.ndarray
-    read: Callable[[], np.ndarray]
-
-    @property
-    def counts(self):
-        return self.read()
-
-
-# --- the elastic model ---
-
-
-def _of_elastic(result, names):
-    origin, spec = result.origin, result.origin.sensor.spec
-    compliance, surface = origin.sensor.prepared("elastic"), origin.underside
-    points, press = _pressed_layer(result, compliance, surface)
-    layer = PressedLayer(compliance, points, press)
-    found = _by_names(names, layer, origin, points, compliance.grid, surface)
-    rates = LayerPressRates(*(np.concatenate([getattr(found[name], one) for name in names])
-                              for one in ("force", "depth", "fields", "thinning", "margin")))
-    touch = touch_rates(surface, spec.map_x_mm, spec.map_y_mm, _of_pose(origin))
-    depth = rates.depth - np.array([touch[list(_POSE).index(name)] if name in _POSE else 0.0 for name in names])[:, None]
-
-    def counts():
-        felt = felt_displacement(spec, press.thinning)
-        found = counts_rates(spec, felt, felt_rates(spec, press.thinning, rates.thinning))
-        if "thickness" in names:
-            found[names.index("thickness")] += _by_gap_at_rest(
-                spec, lambda other: counts_of(other, felt_displacement(other, press.thinning)))
-        return found
-
-    return _Rates(depth, rates.fields[..., ::2, ::2], rates.margin, counts)
-
-
-def _pressed_layer(result, compliance, surface):
-    """The contact of the press once more, with its points."""
-    underside = Underside(surface, compliance.grid)
-    points = underside.nodes(_reach(result, underside, compliance, result.origin.sensor.spec.deepest_mm))
-    return points, press_layer(compliance, points, result.normal_force_n)
-
-
-def _reach(result, underside, compliance, deepest_mm):
-    """Height over first touch up to which points are taken: at least as many as the press had (`press.fast`)."""
-    reach = REACH * underside.depth_on_springs(result.normal_force_n[-1], compliance.foundation_modulus) + LEAST_REACH_MM
-    while reach < deepest_mm and RISE * result.indentation_mm[-1] > reach:
-        reach *= REACH
-    return min(reach, deepest_mm)
-
-
-def _by_names(names, layer, origin, points, grid, surface):
-    """`LayerPressRates` of one parameter, by its name."""
-    found, spec = {}, origin.sensor.spec
-    if moving := [name for name in names if name in _POSE]:
-        rows = [list(_POSE).index(name) for name in moving]
-        together = layer.by_gaps(gap_rates(surface, grid, points, _of_pose(origin))[rows])
-        found |= {name: LayerPressRates(*(values[k:k + 1] for values in vars(together).values())) for k, name in enumerate(moving)}
-    if {"force", "young"} & set(names):
-        found["force"] = layer.by_force()
-        found["young"] = layer.by_young(spec.elastic_layer.young_mpa, found["force"])
-    if "thickness" in names:
-        thinner, thicker = _thinner_and_thicker(spec)
-        found["thickness"] = layer.by_compliance(*map(cached_compliance, (thinner, thicker)), 2 * _THICKER * spec.upper_layer_mm)
-    return found
-
-
-def _of_pose(origin: Origin) -> Callable[[np.ndarray], np.ndarray]:
-    """Velocities (5, n, 3) of an object's points (n, 3) by the numbers of its pose that count."""
-    return lambda points: origin.pose.rates(points)[_OF_POSE]
+def _less_touch(depth, surface, spec, names, velocities):
+    """Rates (k, l) of the indentation from those of the depth, as first touch changes with the pose, too."""
+    touch = touch_rates(surface, spec.map_x_mm, spec.map_y_mm, velocities)
+    return depth - np.array([touch[list(_POSE).index(name)] if name in _POSE else 0.0 for name in names])[:, None]
 
 
 def _thinner_and_thicker(spec):
@@ -203,48 +214,98 @@ def _thinner_and_thicker(spec):
     return [spec.with_upper_layer((1 + share) * spec.upper_layer_mm) for share in (-_THICKER, _THICKER)]
 
 
-def _by_gap_at_rest(spec, read):
-    """The rate of readings by thickness under a displacement that is held, as the gap between the electrodes changes."""
-    thinner, thicker = map(read, _thinner_and_thicker(spec))
-    return (thicker - thinner) / (2 * _THICKER * spec.upper_layer_mm)
+# --- the elastic model ---
+
+
+def _of_elastic(press, of, names):
+    """Rates (k, l, ...) of a press by each name, and how far (k, l) the active set stays."""
+    compliance, spec, surface = press.sensor.prepared("elastic"), press.sensor.spec, press.surface()
+    others = [cached_compliance(other) for other in _thinner_and_thicker(spec)] if "thickness" in names else []
+    target = target_of(press.sensor, compliance.grid)
+    points, contact = touch_object(compliance, underside_of(surface.triangles, target), press.normal_force_n)
+    gaps = gap_rates(surface, compliance.grid, points, press.velocities) if set(names) & set(_POSE) else np.zeros((0, points.count))
+    rates = _rates_on_layer(PressedLayer(compliance, points, contact), spec, names, gaps, others)
+    if of == "depth":
+        return _less_touch(rates.depth, surface, spec, names, press.velocities), rates.margin
+
+    def sunk(one, forces):
+        """Fields (p, l, 2 ny - 1, 2 nx - 1) of forces (p, c, l)."""
+        columns = forces.transpose(1, 0, 2).reshape(points.count, -1)
+        found = (one.fields if of == "deformation_map" else one.thinning)(points, columns)
+        return found.reshape(len(forces), -1, *found.shape[1:])
+
+    now, *moved = sunk(compliance, np.concatenate([contact.force[None], rates.load]))
+    if others:
+        thinner, thicker = (sunk(one, contact.force[None])[0] for one in others)
+        moved[names.index("thickness")] += (thicker - thinner) / _apart_mm(spec)
+    if of == "deformation_map":
+        return np.stack(moved)[..., ::2, ::2], rates.margin
+    felt, felt_moved = felt_with_rates(spec, now, np.stack(moved))
+    counts = counts_rates(spec, felt, felt_moved)
+    if others:      # under a displacement that is held, readings change with the gap between the electrodes
+        thinner, thicker = (counts_of(other, felt_displacement(other, now)) for other in _thinner_and_thicker(spec))
+        counts[names.index("thickness")] += (thicker - thinner) / _apart_mm(spec)
+    return counts, rates.margin
+
+
+def _rates_on_layer(layer, spec, names, gaps, others):
+    """`LayerPressRates` by each name; gaps (5, c): rates of the points' gaps by the pose, empty if none of its numbers is named."""
+    found, order = [layer.by_gaps(gaps)], list(_POSE)[:len(gaps)]
+    if {"force", "young"} & set(names):
+        by_force = layer.by_force()
+        found, order = [*found, by_force, layer.by_young(spec.elastic_layer.young_mpa, by_force)], [*order, "force", "young"]
+    if others:
+        found, order = [*found, layer.by_compliance(*others, _apart_mm(spec))], [*order, "thickness"]
+    return LayerPressRates.joined(found, [order.index(name) for name in names])
+
+
+def _apart_mm(spec):
+    """By how much the thinner and the thicker upper layer differ."""
+    return 2 * _THICKER * spec.upper_layer_mm
 
 
 # --- the foundation model ---
 
 
-def _of_foundation(result, names):
-    origin, spec = result.origin, result.origin.sensor.spec
-    compliance, in_pose = origin.sensor.prepared("foundation"), origin.underside
+def _of_foundation(press, of, names):
+    """Rates (k, l, ...) of a press by each name, and how far (k, l) the active sets stay."""
+    sensor, spec = press.sensor, press.sensor.spec
+    compliance, in_pose = sensor.prepared("foundation"), press.surface()
     surface = in_pose.near_touch(spec.map_x_mm, spec.map_y_mm)
     underside = Underside(surface, compliance.grid)
-    points = underside.points(_reach(result, underside, compliance, spec.thickness_mm))
+    points = underside.points(_reach(press, underside, compliance))
     lift = [0.0, 0.0, in_pose.lowest_mm - surface.lowest_mm]
-    near = _Near(result, surface, points, lambda places: _of_pose(origin)(places + lift), _others(origin, names, points))
-    steps = list(settled_contacts(compliance, points, result.normal_force_n))
+    others = [cached_foundation(other, sensor.laws) for other in _thinner_and_thicker(spec)] if "thickness" in names else []
+    near = _Near(press, surface, points, lambda places: press.velocities(places + lift), others)
+    steps = list(settled_contacts(compliance, points, press.normal_force_n))
     balance = Balance(compliance, points, steps[0])
     found = [near.rates(balance.of(contact), names) for contact in steps]
-    return near.together(found, [contact.load_step for contact in steps], names)
+    margin = np.array([[one.margin for one in of_step] for of_step in found]).T
+    if of == "depth":
+        depth = np.array([[one.depth for one in of_step] for of_step in found]).T
+        return _less_touch(depth, surface, spec, names, near.moving), margin
+    maps = near.maps(found, [contact.load_step for contact in steps], names)
+    return maps if of == "deformation_map" else counts_rates(spec, press.thinning_map_mm, maps), margin
 
 
-def _others(origin, names, points):
-    """Compliances of the sensor with a thinner and a thicker upper layer, where they are needed."""
-    sensor = origin.sensor
-    return [cached_foundation(other, sensor.laws) for other in _thinner_and_thicker(sensor.spec)] if "thickness" in names else []
+def _reach(press, underside, compliance):
+    """Height over first touch up to which points are taken: at least as many as the press had (`press.fast`)."""
+    reach = REACH * underside.depth_on_springs(press.normal_force_n[-1], compliance.foundation_modulus) + LEAST_REACH_MM
+    deepest_mm = press.sensor.spec.thickness_mm
+    while reach < deepest_mm and RISE * press.indentation_mm[-1] > reach:
+        reach *= REACH
+    return min(reach, deepest_mm)
 
 
 @dataclass(frozen=True)
 class _Near:
     """The underside near the sensing surface, with what is needed to differentiate the foundation model's load steps."""
 
-    result: "PressResult"
+    press: SettledPress
     surface: HeightField
     points: ObjectPoints
     moving: Callable[[np.ndarray], np.ndarray]
     others: list[FoundationCompliance]
-
-    @property
-    def apart_mm(self):
-        return 2 * _THICKER * self.result.origin.sensor.spec.upper_layer_mm
 
     def rates(self, balance, names):
         """`Rates` of a load step by each name."""
@@ -256,26 +317,21 @@ class _Near:
         if {"force", "young"} & set(names):
             found["force"] = tangent.by_force()
             found["young"] = tangent.by_moduli(found["force"])
-        if "thickness" in names:
+        if self.others:
             pair = [Balance(other, self.points, contact) for other in self.others]
-            found["thickness"] = tangent.by_compliance(*pair, self.apart_mm, contact.points.gap)
+            found["thickness"] = tangent.by_compliance(*pair, _apart_mm(self.press.sensor.spec), contact.points.gap)
         return [found[name] for name in names]
 
-    def together(self, found, load_steps, names):
-        """The `_Rates` of all load steps; found[step][name]."""
-        origin, spec = self.result.origin, self.result.origin.sensor.spec
-        touch = touch_rates(self.surface, spec.map_x_mm, spec.map_y_mm, self.moving)
-        depth = np.array([[one.depth for one in of_step] for of_step in found]).T
-        depth -= np.array([touch[list(_POSE).index(name)] if name in _POSE else 0.0 for name in names])[:, None]
-        places = Places(origin.sensor.prepared("foundation"), self.points)
+    def maps(self, found, load_steps, names):
+        """Rates (k, l, ny, nx) of the maps of all load steps; found[step][name]."""
+        places = Places(self.press.sensor.prepared("foundation"), self.points)
         maps = np.stack([places.maps(*(np.stack([getattr(one, part) for one in of_step], axis=1) for part in ("load", "lateral")))
                          for of_step in found], axis=1)
-        if "thickness" in names:
+        if self.others:
             thinner, thicker = (FoundationMaps(other, self.points)(load_steps) for other in self.others)
-            maps[names.index("thickness")] += (thicker - thinner) / self.apart_mm
-        return _Rates(depth, maps, np.array([[one.margin for one in of_step] for of_step in found]).T,
-                      lambda: counts_rates(spec, self.result.thinning_map_mm, maps))
+            maps[names.index("thickness")] += (thicker - thinner) / _apart_mm(self.press.sensor.spec)
+        return maps
 
 
-_DIFFERENTIATED: dict[str, Callable[["PressResult", list[str]], _Rates]] = {
+_DIFFERENTIATED: dict[str, Callable[[SettledPress, str, list[str]], tuple[np.ndarray, np.ndarray]]] = {
     "elastic": _of_elastic, "foundation": _of_foundation}

@@ -15,7 +15,8 @@ from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.press.cache import in_words
 from softtact.press.crushing import warn_of_crushing
-from softtact.press.making import make_result, shell_of
+from softtact.press.making import make_result
+from softtact.press.objects import shell_of
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
 from softtact.press.validity import flags_hyperelastic

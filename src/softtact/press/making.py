@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.contact.node_grid import NodeGrid
-from softtact.contact.shell import Shell
-from softtact.contact.undersides import Target
 from softtact.errors import InputError, ShellWarning
 from softtact.press.result import PressResult
 from softtact.press.validity import reasons
@@ -20,18 +17,6 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 RESTS = 1e-6     # of a force: share on the shell from which on an object rests on it
-
-
-def shell_of(sensor: "Sensor") -> Shell:
-    """The shell that a sensor's `edge` states."""
-    edge = sensor.spec.edge
-    return Shell(sensor.spec.footprint_mm, edge.held_below_mm, edge.shell_width_mm)
-
-
-def target_of(sensor: "Sensor", grid: NodeGrid) -> Target:
-    """What the elastic model finds undersides over, on the grid of its compliance."""
-    spec = sensor.spec
-    return Target(grid, spec.map_x_mm, spec.map_y_mm, spec.footprint_mm, shell_of(sensor), spec.deepest_mm)
 
 
 def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, forces: np.ndarray, times: np.ndarray,

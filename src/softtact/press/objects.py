@@ -1,5 +1,5 @@
-"""Pressed objects: soft objects, which deform like the sensor, rigid ones with their positions, and the first touch of
-an object."""
+"""Pressed objects: soft objects, which deform like the sensor, rigid ones with their positions, and the parts of a sensor that an
+object touches first."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.motion import FREEDOMS, Motion
+from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
+from softtact.contact.undersides import Target
 from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.geometry.meshes import misses_sensor, place
@@ -145,7 +147,19 @@ def placed_object(placed: trimesh.Trimesh, *, touch_mm: float, indentation_mm: n
                         way_mm=np.column_stack([motion.aside_mm[:len(down)], down]), turn=turn, about_mm=middle)
 
 
-# --- where an object first touches ---
+# --- what an object touches, and where first ---
+
+
+def shell_of(sensor: "Sensor") -> Shell:
+    """The shell that a sensor's `edge` states."""
+    edge = sensor.spec.edge
+    return Shell(sensor.spec.footprint_mm, edge.held_below_mm, edge.shell_width_mm)
+
+
+def target_of(sensor: "Sensor", grid: NodeGrid) -> Target:
+    """What the elastic model finds undersides over, on the grid of its compliance."""
+    spec = sensor.spec
+    return Target(grid, spec.map_x_mm, spec.map_y_mm, spec.footprint_mm, shell_of(sensor), spec.deepest_mm)
 
 
 def first_direction(motion: Motion) -> np.ndarray:

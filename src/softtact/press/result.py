@@ -237,7 +237,7 @@ class PressResult:
         """
         from softtact.press import gradient
 
-        return gradient.gradient(self, of, [by] if isinstance(by, str) else by)
+        return gradient.gradient(self, of, by)
 
     def plot(self, path: str | Path | None = None, *, full_scale: bool = False) -> "Figure":
         """A matplotlib figure of maps and taxels at each load step; written to `path` (PNG or SVG) where one is given.

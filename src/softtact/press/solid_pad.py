@@ -24,8 +24,8 @@ from softtact.models.solid.body import SolidBody
 from softtact.models.solid.frusta import FrustumItem
 from softtact.models.solid.path import SolidLoadStep, times_of
 from softtact.press.cache import cached_frustum_law
-from softtact.press.making import make_result, shell_of
-from softtact.press.objects import OBJECT, SoftObject
+from softtact.press.making import make_result
+from softtact.press.objects import OBJECT, SoftObject, shell_of
 from softtact.press.result import PressResult
 from softtact.press.validity import flags_solid
 

@@ -26,17 +26,19 @@ if TYPE_CHECKING:
     from softtact.sensors.specification import AnySpec
 
 
-def felt_rates(spec: "AnySpec", displacement_mm: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Rates (k, ..., ny, nx) of `felt_displacement` from those (k, ..., 2 ny - 1, 2 nx - 1) of the displacement."""
-    gap = equivalent_air_gap(spec, displacement_mm)
-    felt, inverse_rates = around(1 / gap), around(-air_gap_rate(spec, displacement_mm) / gap**2 * rates)
+def felt_with_rates(spec: "AnySpec", displacement_mm: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`felt_displacement` (..., ny, nx), and its rates (k, ..., ny, nx) from those (k, ..., 2 ny - 1, 2 nx - 1) of the
+    displacement.
+    """
+    inverse = 1 / equivalent_air_gap(spec, displacement_mm)
+    around_points, inverse_rates = around(inverse), around(-air_gap_rate(spec, displacement_mm) * inverse**2 * rates)
     x, table = felt_table(spec, displacement_mm)
-    slope = table_slope(felt, x, table)
+    slope = table_slope(around_points, x, table)
     first = rates.reshape(len(rates), -1)[:, displacement_mm.argmin()] if table[0] < 0 else np.zeros(len(rates))
     # The table begins at the highest point of a bulge, and follows it: by 1e-5 of the rates.
     by_table, by_x = np.linspace(1, 0, len(table)), -air_gap_rate(spec, table) * x**2
-    along = np.interp(felt, x, by_table) - slope * np.interp(felt, x, by_table * by_x)
-    return slope * inverse_rates + along * first.reshape(-1, *[1] * felt.ndim)
+    along = np.interp(around_points, x, by_table) - slope * np.interp(around_points, x, by_table * by_x)
+    return np.interp(around_points, x, table), slope * inverse_rates + along * first.reshape(-1, *[1] * slope.ndim)
 
 
 def counts_rates(spec: "AnySpec", displacement_mm: np.ndarray, rates: np.ndarray) -> np.ndarray:

@@ -8,11 +8,13 @@ import trimesh
 from foundation_study import SMALL, points_of
 from support.laws import LAWS
 
+from softtact.contact.undersides import ObjectSurface
 from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.gradient import Balance, Tangent
 from softtact.models.foundation.solve import settled_contacts
 from softtact.models.quarter_symmetry import ParityBlocks
 from softtact.press import gradient
+from softtact.press.batch import press_batch
 from softtact.press.sensor import Sensor
 
 FORCE, POSE = 6.0, (0.3, -0.4, 0.0, 4.0, -3.0, 20.0)
@@ -151,6 +153,16 @@ def test_a_gradient_of_a_press_is_about_the_difference_of_presses(compliance, by
         found, wanted = result.gradient(of, by)[by], (getattr(upper, name) - getattr(lower, name)) / (2 * step)
         assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted) + 2.5e-3 * (of == "depth"), of
     assert result.gradient("depth", ["young", "force"]).units == ("mm/1", "mm/N")
+
+
+def test_rows_of_a_batch_are_the_gradients_of_the_presses_alone(compliance):
+    sensor, mesh = Sensor(SMALL, LAWS, prepared_models={"foundation": compliance}), ellipsoid()
+    pose, missed = (*POSE[:2], 3.0, *POSE[3:]), (80.0, *POSE[1:])
+    alone = sensor.press(mesh, pose=pose, force_n=FORCE, model="foundation", label="").gradient("tactile_map", "force")
+    found = press_batch(sensor, ObjectSurface(mesh), [missed, pose], FORCE, model="foundation").gradient("tactile_map", "force")
+    assert found.units == alone.units and list(found.errors) == [0] and np.isnan(found.values[0]).all()
+    np.testing.assert_allclose(found.values[1], alone.values[0], rtol=1e-9)
+    np.testing.assert_allclose(found.active_set_margin[1], alone.active_set_margin[0], rtol=1e-9)
 
 
 @pytest.mark.slow

@@ -82,6 +82,11 @@ class Compliance:
         """Deformation of the lower side; None if it is fixed."""
         return None if self.lower is None else self._fields(self.lower, points, force)
 
+    def thinning(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
+        """By how much the layer is thinner at the nodes of `fields`."""
+        fields, lower = self.fields(points, force), self.lower_fields(points, force)
+        return fields if lower is None else fields - lower
+
     def _fields(self, blocks, points, force):
         quarter = tuple(count // 2 + 1 for count in self.grid.shape)
         inner = blocks.fields(quarter, *self.grid.quarter(points.nodes), force)
