@@ -309,13 +309,15 @@ class _Near:
 
     def rates(self, balance, names):
         """`Rates` of a load step by each name."""
-        contact, found = balance.contact, {}
-        tangent = Tangent.settled(balance, contact.points.gap, contact.load_step.force_n)
-        if set(names) & set(_POSE):
-            rows = gap_rates(self.surface, balance.places.compliance.grid, contact.points, self.moving)
-            found |= {name: tangent.by_gaps(row) for name, row in zip(_POSE, rows, strict=True) if name in names}
-        if {"force", "young"} & set(names):
-            found["force"] = tangent.by_force()
+        contact, wanted = balance.contact, {*names} | ({"force"} if "young" in names else set())
+        tangent, still = Tangent.settled(balance, contact.points.gap, contact.load_step.force_n), np.zeros(self.points.count)
+        rows = gap_rates(self.surface, balance.places.compliance.grid, contact.points, self.moving) if wanted & set(_POSE) else []
+        by_name = dict(zip(_POSE, rows, strict=False))
+        solved, found = [name for name in (*_POSE, "force") if name in wanted], {}
+        if solved:
+            gaps, forces = zip(*((by_name.get(name, still), float(name == "force")) for name in solved), strict=True)
+            found |= zip(solved, tangent.by_gaps(np.stack(gaps), np.array(forces)).each(), strict=True)
+        if "young" in names:
             found["young"] = tangent.by_moduli(found["force"])
         if self.others:
             pair = [Balance(other, self.points, contact) for other in self.others]

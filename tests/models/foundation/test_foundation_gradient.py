@@ -10,7 +10,7 @@ from support.laws import LAWS
 
 from softtact.contact.undersides import ObjectSurface
 from softtact.models.foundation.compliance import foundation_compliance
-from softtact.models.foundation.gradient import Balance, Tangent
+from softtact.models.foundation.gradient import Balance, Rates, Tangent, Unknowns
 from softtact.models.foundation.solve import settled_contacts
 from softtact.models.quarter_symmetry import ParityBlocks
 from softtact.press import gradient
@@ -72,6 +72,19 @@ def test_rates_by_the_gaps_are_differences_of_balances(pressed, tangent):
 def test_rates_by_the_force_are_differences_of_balances(pressed, tangent):
     upper, lower = (Tangent.settled(*pressed, FORCE + sign * 1e-5) for sign in (1, -1))
     assert_difference(tangent.by_force(), upper, lower, 1e-5)
+
+
+def test_rates_by_several_numbers_at_once_are_those_by_each(tangent):
+    place = np.arange(tangent.balance.nodes)
+    gaps = np.stack([np.cos(place), np.zeros(len(place)), 1e-3 * np.sin(3 * place)])      # of unlike sizes
+    for found, wanted in zip(tangent.by_gaps(gaps, np.array([0.0, 1.0, 0.0])).each(),
+                             (tangent.by_gaps(gaps[0]), tangent.by_force(), tangent.by_gaps(gaps[2])), strict=True):
+        for of, name in [(Rates, "load"), (Rates, "lateral"), *((Unknowns, name) for name in FIELDS)]:
+            one, other = (getattr(rates if of is Rates else rates.unknowns, name) for rates in (found, wanted))
+            assert np.linalg.norm(one - other) <= TOLERANCE * np.linalg.norm(other), name
+        assert found.margin == pytest.approx(wanted.margin, rel=1e-4) and found.depth == pytest.approx(wanted.depth, rel=TOLERANCE)
+        for one, other in zip(found.openings, wanted.openings, strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=TOLERANCE * np.abs(other).max())
 
 
 def test_the_active_sets_stay_within_the_margin_and_change_beyond_it(pressed, tangent):

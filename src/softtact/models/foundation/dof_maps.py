@@ -111,8 +111,8 @@ class Sideways:
         self._nodes = places.sideways(used)
 
     def __call__(self, load: np.ndarray) -> np.ndarray:
-        """Displacements (2, c) in mm under a load (n + b,)."""
-        return np.stack([self._between @ part for part in (self._nodes @ load).reshape(2, -1)])
+        """Displacements (2, c) in mm under a load (n + b,); (2, c, l) under loads (n + b, l)."""
+        return np.stack([self._between @ part for part in np.split(self._nodes @ load, 2)])
 
 
 class SoftEdges:

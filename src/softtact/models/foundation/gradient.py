@@ -5,8 +5,10 @@ loads r, lateral loads l, lifts e by rocking, and gaps s by nodes that move side
     gap0 + s - depth + (A [f; q + r] + L' l) = 0    at touching patches,        sum f = F
     extension(q) - w - e = 0                        at standing frusta,         r, l, e, s = effects(f, q, r, l)
 A number changes them by minus the tangent's inverse times the change of these residuals. The contact's tangent is Newton's,
-factored once; the effects are found with GMRES (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856) about it. The solver
-leaves gaps of some micrometres, as it seldom updates where nodes lie under the object; so Newton's method settles the balance.
+factored once; the effects are found with GMRES (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856) about it, those by
+several numbers as one vector, so that a product reads the compliance once for all: arrays have a first axis for the numbers. The
+solver leaves gaps of some micrometres, as it seldom updates where nodes lie under the object, so Newton's method settles the
+balance.
 
 Held besides the active sets: the slopes over the points, and the contact compliance of points beside edges, which changes with the
 share of a point's surroundings that the object covers.
@@ -26,7 +28,7 @@ from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places, Sideways
 from softtact.models.foundation.solve import SettledContact, membrane_loads
 
-_RELATIVE, _ROUNDS, _RESTART = 1e-9, 10, 40     # of GMRES
+_RELATIVE, _ROUNDS, _RESTART = 1e-8, 10, 40     # of GMRES
 _NEWTON, _SETTLED = 30, 1e-6     # steps at most, and a patch's change of force over the total force that ends them
 _REMEDY = "ask for gradients of smaller forces, or of the elastic model."
 _COUPLED = np.array([[0.0, 1.0], [1.0, 0.0]])     # of displacement and tilt of a root by pressure
@@ -36,13 +38,14 @@ _COUPLED = np.array([[0.0, 1.0], [1.0, 0.0]])     # of displacement and tilt of 
 class Unknowns:
     """All unknowns of a balance, their rates, or the residuals of their equations.
 
-    force (c,): N on patches;  q (b,): N on frusta;  depth in mm, its equation: the sum of forces in N
-    loads (b,): N;  lateral (4 b,): N and N mm;  rise (b,): mm;  shift (c,): change of gaps in mm by nodes that move sideways
+    force (..., c): N on patches;  q (..., b): N on frusta;  depth (...) in mm, its equation: the sum of forces in N
+    loads (..., b): N;  lateral (..., 4 b): N and N mm;  rise (..., b): mm
+    shift (..., c): change of gaps in mm by nodes that move sideways
     """
 
     force: np.ndarray
     q: np.ndarray
-    depth: float
+    depth: np.ndarray
     loads: np.ndarray
     lateral: np.ndarray
     rise: np.ndarray
@@ -59,17 +62,23 @@ class Unknowns:
 
 @dataclass(frozen=True)
 class Rates:
-    """Rates of a load step by one number: depth in mm; loads on nodes and frusta (n + b,) and lateral ones (4 b,), for the map;
-    margin: the least change of the number, to either side, at which a patch or frustum gains or loses contact
-    unknowns: all;  openings: of the gaps of patches (c,) and of frusta over the board (b,) in mm
+    """Rates of a load step by one number, or k: depth in mm; loads on nodes and frusta (..., n + b) and lateral ones (..., 4 b),
+    for the map;  margin: the least change of the number, to either side, at which a patch or frustum gains or loses contact
+    unknowns: all;  openings: of the gaps of patches (..., c) and of frusta over the board (..., b) in mm
     """
 
-    depth: float
+    depth: np.ndarray
     load: np.ndarray
     lateral: np.ndarray
-    margin: float
+    margin: np.ndarray
     unknowns: Unknowns
     openings: tuple[np.ndarray, np.ndarray]
+
+    def each(self) -> list["Rates"]:
+        """Those by each of k numbers."""
+        unknowns = map(Unknowns, *(getattr(self.unknowns, one.name) for one in fields(Unknowns)))
+        parts = zip(self.depth, self.load, self.lateral, self.margin, unknowns, zip(*self.openings, strict=True), strict=True)
+        return [Rates(*one) for one in parts]
 
 
 class Balance:
@@ -104,19 +113,28 @@ class Balance:
         frusta = contact.q.size
         per_patch = np.asarray(self.patch.power(2).sum(axis=1)).ravel()
         force = self.patch @ contact.load_step.load[:-frusta] / np.maximum(per_patch, np.finfo(float).tiny)
-        return Unknowns(force, contact.q, contact.load_step.depth, effects.loads, effects.lateral.ravel(), effects.rise,
+        return Unknowns(force, contact.q, np.array(contact.load_step.depth), effects.loads, effects.lateral.ravel(), effects.rise,
                         self.patch @ (self._slope * effects.moved).sum(axis=0))
 
     def load(self, at: Unknowns) -> np.ndarray:
-        """Downward loads (n + b,) on nodes and frusta."""
-        return np.concatenate([self.patch.T @ at.force, -(at.q + at.loads)])
+        """Downward loads (..., n + b) on nodes and frusta."""
+        return np.concatenate([at.force @ self.patch, -(at.q + at.loads)], axis=-1)
 
     def _moved(self, at):
-        """Displacements (c + b,) of patches downwards and frusta upwards, and roots (b, axis, displacement or tilt)."""
+        """Displacements (..., c + b) of patches downwards and frusta upwards, and roots (..., b, axis, displacement or tilt)."""
         down, load = at.lateral @ self._lateral, self.load(at)
-        seen = np.concatenate([self.patch @ down[:self.nodes], -down[self.nodes:]])
-        roots = self._lateral @ load + self._lateral_self @ at.lateral
-        return self.matrix @ np.concatenate([at.force, at.q + at.loads]) + seen, roots.reshape(2, 2, -1).transpose(2, 0, 1)
+        seen = np.concatenate([down[..., :self.nodes] @ self.patch.T, -down[..., self.nodes:]], axis=-1)
+        roots = (self._lateral @ load.T + self._lateral_self @ at.lateral.T).T
+        moved = np.concatenate([at.force, at.q + at.loads], axis=-1) @ self.matrix.T + seen
+        return moved, np.moveaxis(roots.reshape(*load.shape[:-1], 2, 2, -1), -1, -3)
+
+    def _on_lattice(self, moved):
+        """Descents (..., ny, nx) of the frusta."""
+        return -moved[..., self.patches:].reshape(*moved.shape[:-1], *self._lattice)
+
+    def _membrane_forces(self, at):
+        """Membrane forces (..., 3, ny, nx)."""
+        return (self._membrane @ self.load(at).T).T.reshape(*at.force.shape[:-1], 3, *self._lattice)
 
     def gaps(self, at: Unknowns, gap_mm: np.ndarray) -> np.ndarray:
         """Gaps (c,) in mm of patches whose points have the gaps gap_mm (n,) at depth 0."""
@@ -131,9 +149,8 @@ class Balance:
         more, growth = law.stiffening(at.q)
         stiffness = more - at.q[:, None, None] * _COUPLED
         pushed = 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
-        membrane = (self._membrane @ self.load(at)).reshape(3, *self._lattice)
         return Unknowns(touching, standing, at.force.sum() - force_n,
-                        at.loads - membrane_loads(down.reshape(self._lattice), membrane).ravel() - pushed,
+                        at.loads - membrane_loads(self._on_lattice(moved), self._membrane_forces(at)).ravel() - pushed,
                         at.lateral + _flat(np.einsum("bij,baj->bai", stiffness, roots)),
                         at.rise - law.rise(np.hypot(*roots[:, :, 0].T), at.q), at.shift - self.shift(at))
 
@@ -144,18 +161,18 @@ class Balance:
                 np.where(contact.standing, at.q > 0, lifted < 0))
 
     def shift(self, at: Unknowns) -> np.ndarray:
-        """Changes (c,) of the patches' gaps in mm by nodes that move sideways below a slope."""
-        return self.patch @ (self._slope * self._sideways(self.load(at))).sum(axis=0)
+        """Changes (..., c) of the patches' gaps in mm by nodes that move sideways below a slope."""
+        return np.einsum("an,an...->...n", self._slope, self._sideways(self.load(at).T)) @ self.patch.T
 
-    def nothing(self) -> Unknowns:
-        """Unknowns that are all zero."""
+    def nothing(self, *numbers: int) -> Unknowns:
+        """Unknowns that are all zero, with this first axis."""
         c, b = self.patches, len(self.contact.q)
-        return Unknowns(np.zeros(c), np.zeros(b), 0.0, np.zeros(b), np.zeros(4 * b), np.zeros(b), np.zeros(c))
+        return Unknowns(*(np.zeros((*numbers, *size)) for size in ((c,), (b,), (), (b,), (4 * b,), (b,), (c,))))
 
 
 def _flat(of_roots):
-    """Values (4 b,) of roots (b, axis, displacement or tilt): along x, then along y."""
-    return of_roots.transpose(1, 2, 0).ravel()
+    """Values (..., 4 b) of roots (..., b, axis, displacement or tilt): along x, then along y."""
+    return np.moveaxis(of_roots, -3, -1).reshape(*of_roots.shape[:-3], -1)
 
 
 class Tangent:
@@ -166,8 +183,7 @@ class Tangent:
         contact, law = balance.contact, balance.law
         self._touching, self._standing = np.flatnonzero(contact.touching), np.flatnonzero(contact.standing)
         moved, self._roots = balance._moved(self.at)
-        self._down = -moved[balance.patches:].reshape(balance._lattice)
-        self._membrane = (balance._membrane @ balance.load(self.at)).reshape(3, *balance._lattice)
+        self._down, self._membrane = balance._on_lattice(moved), balance._membrane_forces(self.at)
         self._slope = law.slope(self.at.q)
         more, self._growth = law.stiffening(self.at.q)
         self._stiffness = more - self.at.q[:, None, None] * _COUPLED
@@ -180,13 +196,14 @@ class Tangent:
         self._ones = (np.arange(len(rows)) < len(self._touching)).astype(float)
         self._per_depth = sla.cho_solve(self._factor, self._ones)
 
-    def by_gaps(self, gap_rates: np.ndarray) -> Rates:
-        """Rates by a number on which the points' gaps (n,) in mm depend."""
-        return self._by(replace(self.balance.nothing(), force=self.balance.patch @ gap_rates))
+    def by_gaps(self, gap_rates: np.ndarray, force_rates: np.ndarray | float = 0.0) -> Rates:
+        """Rates by a number, or k, on which the points' gaps (..., n) in mm and the force (...) in N depend."""
+        nothing = self.balance.nothing(*gap_rates.shape[:-1])
+        return self._by(replace(nothing, force=gap_rates @ self.balance.patch.T, depth=nothing.depth - force_rates))
 
     def by_force(self) -> Rates:
         """Rates by the force in N."""
-        return self._by(replace(self.balance.nothing(), depth=-1.0))
+        return self.by_gaps(np.zeros(self.balance.nodes), 1.0)
 
     def by_moduli(self, by_force: Rates) -> Rates:
         """Rates by a common factor of all moduli, from those by force: displacements depend on force over factor."""
@@ -211,8 +228,8 @@ class Tangent:
     def _by(self, change):
         found = self.solve(change)
         moving, c = self.balance._moved(found)[0], self.balance.patches
-        opening = change.force + found.shift - found.depth + moving[:c]
-        lifting = change.q + moving[c:] - found.rise
+        opening = change.force + found.shift - found.depth[..., None] + moving[..., :c]
+        lifting = change.q + moving[..., c:] - found.rise
         return Rates(found.depth, self.balance.load(found), found.lateral, self._margin(found, opening, lifting), found,
                      (opening, lifting))
 
@@ -233,53 +250,56 @@ class Tangent:
 
     def _contact(self, effects, change):
         """Rates of force, q and depth for those of the effects, with the residuals' `change` of the contact balanced."""
-        balance = self.balance
-        c, b = balance.patches, len(self.at.q)
-        still = Unknowns(np.zeros(c), np.zeros(b), 0.0, *effects)
+        balance, c, touching, standing = self.balance, self.balance.patches, self._touching, self._standing
+        nothing = balance.nothing(*effects[0].shape[:-1])
+        still = Unknowns(nothing.force, nothing.q, nothing.depth, *effects)
         moved = balance._moved(still)[0]
-        right = np.concatenate([-(change.force + still.shift + moved[:c])[self._touching],
-                                (-change.q - moved[c:] + still.rise)[self._standing]])
-        at_rest = sla.cho_solve(self._factor, right)
-        depth = (-change.depth - self._ones @ at_rest) / (self._ones @ self._per_depth)
-        both = at_rest + depth * self._per_depth
-        still.force[self._touching], still.q[self._standing] = np.split(both, [len(self._touching)])
-        return Unknowns(still.force, still.q, depth, *effects)
+        right = np.concatenate([-(change.force + still.shift + moved[..., :c])[..., touching],
+                                (-change.q - moved[..., c:] + still.rise)[..., standing]], axis=-1)
+        at_rest = sla.cho_solve(self._factor, right.T, check_finite=False).T
+        depth = (-change.depth - at_rest @ self._ones) / (self._ones @ self._per_depth)
+        both = at_rest + depth[..., None] * self._per_depth
+        still.force[..., touching], still.q[..., standing] = np.split(both, [len(touching)], axis=-1)
+        return replace(still, depth=depth)
 
     def _effects(self, rate):
         """Rates of loads, lateral loads, rise and shift that follow from those of all unknowns."""
         balance, law = self.balance, self.balance.law
         moved, roots = balance._moved(rate)
-        down = -moved[balance.patches:].reshape(balance._lattice)
-        membrane = (balance._membrane @ balance.load(rate)).reshape(3, *balance._lattice)
         by_q = rate.q * self._slope      # of the compression
-        loads = membrane_loads(down, self._membrane) + membrane_loads(self._down, membrane)
-        pushed = (np.einsum("bai,bij,baj->b", self._roots, self._growth, roots)
+        loads = (membrane_loads(balance._on_lattice(moved), self._membrane)
+                 + membrane_loads(self._down, balance._membrane_forces(rate)))
+        pushed = (np.einsum("bai,bij,...baj->...b", self._roots, self._growth, roots)
                   + 0.5 * by_q * np.einsum("bai,bij,baj->b", self._roots, self._curving, self._roots))
-        stiffer = by_q[:, None, None] * self._growth - rate.q[:, None, None] * _COUPLED
-        lateral = -_flat(np.einsum("bij,baj->bai", self._stiffness, roots) + np.einsum("bij,baj->bai", stiffer, self._roots))
+        stiffer = by_q[..., None, None] * self._growth - rate.q[..., None, None] * _COUPLED
+        lateral = -_flat(np.einsum("bij,...baj->...bai", self._stiffness, roots)
+                         + np.einsum("...bij,baj->...bai", stiffer, self._roots))
         aside = self._roots[:, :, 0]
         length = np.maximum(np.hypot(*aside.T), np.finfo(float).tiny)
-        sideways = (aside * roots[:, :, 0]).sum(axis=1) / length
+        sideways = (aside * roots[..., 0]).sum(axis=-1) / length
         rise = law.rise_rate(np.hypot(*aside.T), self.at.q, sideways, rate.q)
-        return loads.ravel() + pushed, lateral, rise, balance.shift(rate)
+        return loads.reshape(pushed.shape) + pushed, lateral, rise, balance.shift(rate)
 
     def solve(self, change: Unknowns) -> Unknowns:
         """Rates of the unknowns at which rates `change` of the residuals are balanced."""
-        sizes, nothing = np.cumsum([len(one) for one in (change.loads, change.lateral, change.rise)]), self.balance.nothing()
+        sizes, nothing = np.cumsum([one.shape[-1] for one in self._split(change)[:3]]), self.balance.nothing()
+        start = self._contact(self._split(self.balance.nothing(*change.force.shape[:-1])), change)
+        right = np.concatenate(self._effects(start), axis=-1) - np.concatenate(self._split(change), axis=-1)
+        scale = np.concatenate([np.full(one.shape[-1], size)
+                                for one, size in zip(self._split(change), self._sizes(), strict=True)])
+        length = np.maximum(np.linalg.norm(right / scale, axis=-1, keepdims=True), np.finfo(float).tiny)     # of each number's
 
         def missing(x):
-            effects = np.split(x, sizes)
-            return x - np.concatenate(self._effects(self._contact(effects, nothing)))
+            effects = x.reshape(right.shape) * scale
+            follow = self._effects(self._contact(np.split(effects, sizes, axis=-1), nothing))
+            return ((effects - np.concatenate(follow, axis=-1)) / scale).ravel()
 
-        start = self._contact(self._split(nothing), change)
-        right = np.concatenate(self._effects(start)) - np.concatenate(self._split(change))
-        scale = np.concatenate([np.full(len(one), size) for one, size in zip(self._split(change), self._sizes(), strict=True)])
-        operator = LinearOperator((len(right),) * 2, matvec=lambda x: missing(scale * x) / scale, dtype=float)
-        x, failed = gmres(operator, right / scale, rtol=_RELATIVE, atol=0.0, restart=_RESTART, maxiter=_ROUNDS)
+        operator = LinearOperator((right.size,) * 2, matvec=missing, dtype=float)
+        x, failed = gmres(operator, (right / scale / length).ravel(), rtol=_RELATIVE, atol=0.0, restart=_RESTART, maxiter=_ROUNDS)
         if failed:
             force_n = self.balance.contact.load_step.force_n
             raise ConvergenceError(f"The gradient of the foundation model did not settle at {force_n:g} N; {_REMEDY}")
-        return self._contact(np.split(scale * x, sizes), change)
+        return self._contact(np.split(scale * length * x.reshape(right.shape), sizes, axis=-1), change)
 
     def _split(self, at):
         return at.loads, at.lateral, at.rise, at.shift
@@ -294,7 +314,7 @@ class Tangent:
         gap, lifted = balance.gaps(at, contact.points.gap), -self._down.ravel() - at.rise
         distance = np.concatenate([np.where(contact.touching, at.force, np.maximum(gap, 0.0))[contact.possible],
                                    np.where(contact.standing, at.q, np.maximum(lifted, 0.0))])
-        speed = np.abs(np.concatenate([np.where(contact.touching, rate.force, opening)[contact.possible],
-                                       np.where(contact.standing, rate.q, lifting)]))
+        speed = np.abs(np.concatenate([np.where(contact.touching, rate.force, opening)[..., contact.possible],
+                                       np.where(contact.standing, rate.q, lifting)], axis=-1))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.where(speed > 0, distance / speed, np.inf).min())
+            return np.where(speed > 0, distance / speed, np.inf).min(axis=-1)

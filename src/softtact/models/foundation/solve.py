@@ -187,13 +187,14 @@ class FiniteDisplacement:
 
 
 def membrane_loads(down: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Loads on the frusta (ny, nx), upwards in N, from membrane forces (3, ny, nx) in N/mm in a slab with descents `down`
-    (ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is fixed.
+    """Loads on the frusta (..., ny, nx), upwards in N, from membrane forces (..., 3, ny, nx) in N/mm in a slab with descents `down`
+    (..., ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is fixed.
 
     Slopes w_a are taken over two pitches: the slab is thicker than a pitch and rotates as a whole only over such lengths.
     """
-    x, y = _centred(down, 1), _centred(down, 0)
-    return -_centred(forces[0] * x + forces[2] * y, 1) - _centred(forces[1] * y + forces[2] * x, 0)
+    x, y = _centred(down, -1), _centred(down, -2)
+    along_x, along_y, shear = np.moveaxis(forces, -3, 0)
+    return -_centred(along_x * x + shear * y, -1) - _centred(along_y * y + shear * x, -2)
 
 
 def _centred(values, axis):
