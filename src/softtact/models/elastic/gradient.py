@@ -44,7 +44,8 @@ class PressedLayer:
     def __init__(self, compliance: Compliance, points: ObjectPoints, contact: ContactLoadSteps) -> None:
         self._points, self._contact, self._active = points, contact, contact.force > 0
         self._among = compliance.among(points).astype(float)
-        self._factors = [sla.cho_factor(self._among[np.ix_(active, active)], check_finite=False) for active in self._active.T]
+        self._factors = [sla.cho_factor(self._among[np.ix_(active, active)].T, overwrite_a=True, check_finite=False)
+                         for active in self._active.T]      # transposed, a symmetric matrix is overwritten without a copy
 
     def by_gaps(self, gap_rates: np.ndarray) -> LayerPressRates:
         """By k numbers on which the gaps depend with rates (k, c) in mm."""
