@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pytest
 import trimesh
+from support.small_sensors import small_gel
 from test_gradient import ARRAYS, POSE, SMALL, TIGHT, ellipsoid, sensor_in_double
 
 from softtact.contact.undersides import ObjectSurface
@@ -15,7 +16,7 @@ from softtact.models.elastic import compliance as elastic
 from softtact.models.elastic.compliance import touch_object
 from softtact.press import gradient
 from softtact.press.batch import press_batch
-from softtact.press.sensor import Sensor
+from softtact.press.sensor import Sensor, load_sensor
 
 ELLIPSOID, BALL, PLATE = ellipsoid(), trimesh.creation.icosphere(radius=4.0), trimesh.creation.box((12.0, 2.0, 2.0))
 WALL = trimesh.creation.box((0.08, 3.0, 2.0))
@@ -114,12 +115,14 @@ def test_a_vector_for_each_press_gives_a_row_for_each(sensor):
         found.vjp(weights[0, :2, :2])
 
 
-def test_a_batch_that_cannot_be_differentiated_is_refused_in_a_sentence(sensor):
+def test_a_batch_that_cannot_be_differentiated_is_refused_in_a_sentence(sensor, tmp_path):
     batch = pressed(sensor, JOBS[:1])
     with pytest.raises(InputError, match="there is no parameter with a gradient 'posse'"):
         batch.gradient("depth", "posse")
     with pytest.raises(InputError, match="This batch does not know its sensor and objects"):
         pickle.loads(pickle.dumps(batch)).gradient("depth", "pose")
+    with pytest.raises(InputError, match="or was pressed on a gel, whose presses have none"):
+        pressed(load_sensor(small_gel(tmp_path)), [JOBS[1]]).gradient("depth", "pose")
     blind = Sensor(SMALL.model_copy(update={"taxels": None}), {}, prepared_models=sensor.prepared_models)
     with pytest.raises(InputError, match="has no readout 'taxels' of kind capacitance"):
         pressed(blind, JOBS[:1]).gradient("tactile_map", "x")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from support.sensors import CORO
+from support.small_sensors import small_block
 
 from softtact.contact.undersides import ObjectSurface
 from softtact.errors import ConvergenceError, InputError, ShellWarning
@@ -144,8 +145,10 @@ def test_presses_on_the_shell_are_counted_in_one_warning(sensor):
     assert len(found) == 1
 
 
-def test_wrong_counts_forces_and_models_are_refused(sensor):
+def test_wrong_counts_forces_models_and_sensors_are_refused(sensor, tmp_path):
     surface, poses = ObjectSurface(PUNCH), [JOBS[0][1]] * 2
+    with pytest.raises(InputError, match="block, a sensor of kind solid: a solid has no layers and no taxels"):
+        press_batch(load_sensor(small_block(tmp_path)), surface, poses, 4.0)
     with pytest.raises(InputError, match=r"'coro' is a name; give softtact.load_sensor\('coro'\)"):
         press_batch("coro", surface, poses, 4.0)
     with pytest.raises(InputError, match="3 objects and 2 poses"):

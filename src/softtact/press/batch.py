@@ -112,6 +112,7 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
     """
     if isinstance(sensor, str | Path):
         raise InputError(f"press_batch: {str(sensor)!r} is a name; give softtact.load_sensor({str(sensor)!r}), loaded once.")
+    sensor.spec.need_layers()
     listed = _listed(poses)
     every = _objects(surfaces, len(listed))
     forces = _forces(force_n, len(listed))
@@ -127,8 +128,7 @@ def press_batch(sensor: "Sensor", surfaces: ObjectSurface | Sequence[ObjectSurfa
     for numbers, found in press(sensor, every, listed, forces[:, None], model=model, device=device):
         batch.take(numbers, found)
     warn_of_shells(sensor, batch.arrays["normal_force_n"], batch.arrays["pad_force_n"])
-    far = sensor.spec.has_layers and sensor.spec.edge.far
-    return batch.finished(None if far else BatchOrigin(sensor, model, every, listed))
+    return batch.finished(None if sensor.spec.edge.far else BatchOrigin(sensor, model, every, listed))
 
 
 def _listed(poses):

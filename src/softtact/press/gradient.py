@@ -123,7 +123,7 @@ def gradient_of_batch(batch: "PressBatch", of: str, by: str | Sequence[str]) -> 
     names, origin = _parameters(of, by), batch.origin
     if origin is None:
         raise InputError("This batch does not know its sensor and objects, which a gradient needs: it comes from another process, "
-                         "or was pressed on a gel; press again with press_batch.")
+                         "or was pressed on a gel, whose presses have none; press a pad with press_batch in this process.")
     _check_taxels(origin.sensor, of)
     rows: Any = {"tactile_map": batch.tactile_map, "deformation_map": batch.deformation_map_mm, "depth": batch.indentation_mm}[of]
     values, margin = np.full((len(names), *rows.shape), np.nan), np.full((len(names), len(rows)), np.nan)
