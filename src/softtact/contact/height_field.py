@@ -16,6 +16,7 @@ import trimesh
 
 from softtact.compiled import compiled
 from softtact.contact.lower_envelope import NO_CONTACT_MM, facing_down, lowest_corner, lowest_in_box, lowest_over_lines
+from softtact.contact.rounded_object import RoundedObject
 
 _KEPT: "WeakKeyDictionary[trimesh.Trimesh, HeightField]" = WeakKeyDictionary()     # by their contents' hash
 NEAR_MM = 0.1         # height over the sensing surface, or depth below it, beyond which an object is moved to first touch
@@ -27,7 +28,7 @@ class HeightField:
     def __init__(self, mesh: trimesh.Trimesh, *, bins: int = 128) -> None:
         points, facets = np.array(mesh.vertices, dtype=float), np.ascontiguousarray(mesh.faces, dtype=np.int64)
         self.triangles, self.normals, kept = facing_down(points, facets)
-        self._corners, self._bins = facets[kept], bins
+        self._corners, self._bins, self._surface = facets[kept], bins, (points, facets)
         self.lowest_mm = float(points[facets, 2].min())
 
     @classmethod
@@ -45,6 +46,11 @@ class HeightField:
         size = np.maximum((high - low) / self._bins, 1e-6)
         return low, size, *_fill_bins(self.triangles, low, size, self._bins)
 
+    @cached_property
+    def rounded(self) -> RoundedObject:
+        """The object with rounded edges."""
+        return RoundedObject.of(*self._surface)
+
     def _plan_bounds(self):
         if not len(self.triangles):
             return np.zeros(2), np.ones(2)
@@ -55,6 +61,9 @@ class HeightField:
         """The height field after a displacement (3,) of the object; both share the bins in which triangles are searched for."""
         other, way = copy.copy(self), np.asarray(offset_mm, dtype=float)
         other.triangles, other.lowest_mm = self.triangles + way, self.lowest_mm + way[2]
+        other._surface = (self._surface[0] + way, self._surface[1])
+        if "rounded" in vars(self):
+            other.rounded = self.rounded.moved(way)
         if "_search" in vars(self):
             origin, *same = self._search
             other._search = (origin + way[:2], *same)
@@ -140,6 +149,12 @@ class MovedSurface:
     """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
     offset_mm: np.ndarray
     """The displacement (2,)."""
+
+    @cached_property
+    def rounded(self) -> RoundedObject | None:
+        """The object with rounded edges; None where the surface has none."""
+        rounded = getattr(self.surface, "rounded", None)
+        return rounded and rounded.moved(np.append(self.offset_mm, 0.0))
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""

@@ -21,6 +21,12 @@ def gauss(points: int, dimension: int) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([g.ravel() for g in grids]), np.prod([g.ravel() for g in weights], axis=0)
 
 
+def midpoints(parts: int, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    """The middles of equal parts of [-1, 1]^dimension: points (n, dimension) and weights (n,)."""
+    places = np.indices((parts,) * dimension).reshape(dimension, -1).T
+    return (2 * places + 1) / parts - 1, np.full(len(places), (2 / parts) ** dimension)
+
+
 def gauss_rule(points: int, dimension: int) -> Quadrature:
     """The same as a `Quadrature`."""
     return Quadrature(*gauss(points, dimension), degree=2 * points - 1)

@@ -167,6 +167,7 @@ def _read_load_step(body, maps, load_step, *, from_mm):
             "points": np.count_nonzero(top.under_pressure(slab)),
             "frustum_compression_mm": body.support.largest_compression(support.displacement), "residual_n": load_step.residual_n,
             "least_volume_ratio": body.slab.cover_mesh.least_volume_ratio(slab.displacement),
+            "edge_radius_mm": slab.projection.edge_radius_mm,
             "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations,
             "rough": load_step.rough, "pressure": _pressure(top, slab)}
 

@@ -81,6 +81,9 @@ class PressResult:
     least_volume_ratio: np.ndarray | None = field(default=None, metadata=_array("1", "step") | _LATER)
     """(step,) of the hyperelastic model: least deformed over undeformed volume of the cover, over the integration points and
     corners of its elements; 0 or less where one is folded under an edge. None of other models."""
+    edge_radius_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step") | _LATER)
+    """(step,) in mm of the hyperelastic model: by how much the object's edges were rounded, because the cover would have folded
+    under them; 0 where they are as sharp as the object's mesh. None of other models."""
     iterations: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) iterations of the solver."""
     converged: np.ndarray = field(metadata=_array("1", "step"))

@@ -1,7 +1,7 @@
 """Steps that are exact in the contact: against a general minimiser, and what a factor serves for."""
 
-import itertools
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from softtact.contact.penalty import Contact, penalty
 from softtact.geometry.meshes import place
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.models.hyperelastic import newton_step
-from softtact.models.hyperelastic.body import _shifts
+from softtact.models.hyperelastic.body import _REMEDIES, _first_remedy
 from softtact.models.hyperelastic.newton_step import ContactFactor, ContactStepper
 from softtact.models.hyperelastic.states import LinearGaps
 
@@ -220,11 +220,15 @@ def test_a_step_is_in_balance_with_what_the_points_face_where_it_leads(exact):
     assert not carried[1::2].any()
 
 
-@pytest.mark.parametrize(("last", "again", "first"), [
-    (None, False, [None, 0.0, 0.001]), (0.0, False, [None, 0.0, 0.001]), (0.016, False, [0.004, 0.016]),
-    (None, True, [None, 0.0, 0.001]), (0.0, True, [0.0, 0.001]), (0.016, True, [0.016, 0.064])])
+@pytest.mark.parametrize(("last", "again", "first"), [(0, False, 0), (1, False, 0), (5, False, 3), (0, True, 0), (5, True, 5)])
 def test_a_damped_tangent_begins_with_what_was_enough_before_and_another_one_with_less(last, again, first):
-    assert list(itertools.islice(_shifts(last, again), len(first))) == pytest.approx(first)
+    assert _first_remedy(last, again) == first
+
+
+def test_what_makes_a_tangent_positive_grows_from_nothing_to_a_shift_that_outweighs_any_negative_mode():
+    strength = [(remedy.cells + remedy.cover, remedy.shift) for remedy in _REMEDIES]
+    assert strength[0] == (0.0, 0.0) and strength[-1][1] > 1e6
+    assert all(after[1] > before[1] or after[0] > 0 for before, after in pairwise(strength))
 
 
 def test_a_tangent_is_of_its_own_state_whatever_was_asked_before():

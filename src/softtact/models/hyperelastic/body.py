@@ -7,7 +7,7 @@ would halve it for all. Each local step decreases the frustum's energy, and so t
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -36,9 +36,29 @@ _FARTHEST_MM = 0.05      # largest movement of a node in a step
 _SHARE = 0.3             # of the tolerance: largest residual of a frustum, as a later movement of its root adds to it
 _FRUSTA_AT_ONCE = 8             # frusta that a thread condenses at once
 _DAMPINGS = 4         # steps that are tried with increasing damping of the cells that move too far
-_FIRST_SHIFT = 0.001   # N/mm on every free unknown of the slab, increased until the tangent is positive definite ...
-_MORE, _LESS = 4.0, 0.25   # factors of the last shift: for the next trial, and for the start of a later search
-_MOST_SHIFTS = 20     # ... up to this number: a tangent that is not finite never becomes positive definite
+
+
+@dataclass(frozen=True)
+class _Remedy:
+    """How an indefinite tangent is made positive definite: shares of the negative modes of cells and cover that become positive
+    (their absolute eigenvalues, element by element), and N/mm that are added on every free unknown of the slab."""
+
+    cells: float = 0.0
+    cover: float = 0.0
+    shift: float = 0.0
+
+
+# In turn, until the tangent is positive definite, so that every step decreases the energy. Modes that the whole body holds are
+# negative in some element; made positive there, they are too stiff, and steps along them short. A tangent that is not finite never
+# becomes positive definite, so there is an end.
+_REMEDIES = [_Remedy(), _Remedy(cells=1.0), *(_Remedy(share, share) for share in (0.125, 0.25, 0.5)),
+             *(_Remedy(1.0, 1.0, 0.001 * 4.0**number) for number in range(20))]
+_EASED = 2     # by how many of them the search starts before the last one that served
+
+
+def _first_remedy(last, damped_before):
+    """The number of the remedy that a search tries first; damped_before: the last tangent differed only in the damping of cells."""
+    return last if damped_before else max(0, last - _EASED)
 
 
 def balanced(support: Support, state: SupportState, tolerance_n: float, *,
@@ -134,22 +154,6 @@ class BodyFriction:
                        support=replace(state.support, friction_response=support))
 
 
-def _shifts(last, damped_before):
-    """Shifts to try in turn until a tangent is positive definite, so that every step decreases the energy.
-
-    None: unchanged;  0: the cells' negative eigenvalues are made positive;  more: the cover's too, and a shift in N/mm is added
-    last: the shift of the last tangent, None if none was needed; the search starts from a part of it
-    damped_before: the last tangent differed only in the damping of cells; the search starts from its shift
-    """
-    first = max(_FIRST_SHIFT, (1.0 if damped_before else _LESS) * (last or 0.0))
-    if first == _FIRST_SHIFT and not (damped_before and last is not None):
-        yield None
-    if first == _FIRST_SHIFT and not (damped_before and last):
-        yield 0.0
-    for number in range(_MOST_SHIFTS):
-        yield first * _MORE**number
-
-
 class LayeredBody:
     """Slab on a `Support`, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
@@ -162,7 +166,7 @@ class LayeredBody:
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
-        self._shift: float | None = None     # the one that made the last tangent positive definite
+        self._remedy = 0     # the number of the one that made the last tangent positive definite
 
     def sum_with(self, loops: "ModuleType | WarpKernels") -> None:
         """Use `loops` for the sums over elements: `kernels`, the default, or `WarpKernels`."""
@@ -191,24 +195,33 @@ class LayeredBody:
     def begin(self) -> None:
         """Discard all tangents and factors of an earlier press, since they would change the last digits of a result."""
         self.slab.resist_folding(False)
+        self.slab.top.round_edges(False)
         self.cells.reset()
         self._forget_factors()
         self.friction.reset()
 
     def _forget_factors(self):
         self.stepper.reset()
-        self._shift = None
+        self._remedy = 0
 
     def folds(self, state: BodyState) -> bool:
         """Whether an element of the cover is folded, and the cover does not yet resist that."""
         return not self.slab.resists_folding and self.slab.cover_mesh.least_volume_ratio(state.slab.displacement) <= 0
 
-    def resisting_folding(self, state: BodyState) -> BodyState:
-        """The state, at which no element is folded, with a cover that resists folding until `begin`."""
+    def has_points_of(self, state: BodyState) -> bool:
+        """Whether a state has the contact points that the cover has now."""
+        return len(state.slab.gaps) == len(self.slab.top.area)
+
+    def resisting_folding(self, state: BodyState, surface: ObjectSurface) -> BodyState:
+        """The state, at which no element is folded, with a cover that resists folding under an object with rounded edges, if its
+        surface has them, until `begin`. The history of the contact with the object begins anew.
+        """
         self.slab.resist_folding(True)
+        self.slab.top.round_edges(getattr(surface, "rounded", None) is not None)
         self._forget_factors()
-        resisting = self.evaluate(state.slab.displacement, state.support.displacement, state.indentation, state.slab.projection,
-                                  state.history)
+        displacement, history = state.slab.displacement, BodyHistory(self.slab.top.fresh_history(), state.support.history)
+        resisting = self.evaluate(displacement, state.support.displacement, state.indentation,
+                                  self.slab.project(displacement, surface, state.indentation), history)
         if resisting is None:
             raise ConvergenceError("The cover is folded under an edge of the object; ask for load steps nearer to each other.")
         return resisting
@@ -285,23 +298,25 @@ class LayeredBody:
         nan if that is impossible, so that Newton's method fails.
         """
         excess, border = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
-        positive = None
-        for shift in _shifts(self._shift, damped_before):
-            if shift is not None and positive is None:
+        positive, first = None, _first_remedy(self._remedy, damped_before)
+        for number, remedy in enumerate(_REMEDIES[first:], start=first):
+            if number and positive is None:
                 positive = self.cells.positive_outer(workers=self.workers)
-            step = self.stepper.step(self._rubber_tangent(state, shift, positive), residual, contact, friction_border=border,
+            step = self.stepper.step(self._rubber_tangent(state, remedy, positive), residual, contact, friction_border=border,
                                      excess=excess, largest=largest_mm)
             if step is not None:
-                self._shift = shift
+                self._remedy = number
                 return step
         return np.full(len(residual), np.nan), np.nan
 
-    def _rubber_tangent(self, state, shift, positive):
-        """The rubber's tangent with a shift, see `_shifts`; positive: the cells' condensed matrices made positive definite."""
-        if shift is None:
-            return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
-        rubber = self.slab.rubber_tangent(state.slab, positive, positive=shift > 0, workers=self.workers)
-        self.slab.add_to_diagonal(rubber, shift)
+    def _rubber_tangent(self, state, remedy, positive):
+        """The rubber's tangent with a `_Remedy`; positive: the cells' condensed matrices made positive definite."""
+        cells = self.cells.outer
+        if remedy.cells:
+            cells = [own + remedy.cells * (other - own) for own, other in zip(cells, positive, strict=True)]
+        rubber = self.slab.rubber_tangent(state.slab, cells, positive=remedy.cover, workers=self.workers)
+        if remedy.shift:
+            self.slab.add_to_diagonal(rubber, remedy.shift)
         return rubber
 
     def penetration(self, state: BodyState) -> float:

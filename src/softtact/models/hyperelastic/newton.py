@@ -19,6 +19,7 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': beyond, elements of the default mesh may be unstable
 _ROUGH_SOON = 8     # iterations after which the rough tolerance applies beyond `DEEP`, or if it applied before an augmentation
+_FOLDED = 4        # iterations in turn with a folded cover that end a run; an element may fold on the way and unfold
 _NEARLY = 3.0      # factor of the allowed overlap if points are under an edge: their augmentation takes tens of steps
 
 
@@ -109,7 +110,8 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
 
 
 def _newton(body, surface, state, force, tolerance, settings):
-    return solve(_Press(body, surface, force, tolerance, settings), state, max_iterations=settings.max_iterations,
+    kind = _PressOfRounded if body.slab.top.rounds_edges else _Press
+    return solve(kind(body, surface, force, tolerance, settings), state, max_iterations=settings.max_iterations,
                  nearly_n=settings.nearly_balanced * _scale(force, settings))
 
 
@@ -122,7 +124,7 @@ class _Press:
 
     def __init__(self, body, surface, force, tolerance, settings):
         self.body, self.surface, self.force, self.tolerance, self.settings = body, surface, force, tolerance, settings
-        self.projecting, self.fresh, self.projected, self.iterations = True, False, False, 0
+        self.projecting, self.fresh, self.projected, self.iterations, self.folded = True, False, False, 0, 0
 
     def prepared(self, state, iteration):
         self.projected = self.projecting and iteration < self.settings.projection_iterations
@@ -152,12 +154,18 @@ class _Press:
         return late and share > DEEP and residual <= settings.rough_tolerance * _scale(self.force, settings)
 
     def step(self, state):
+        if self.folded >= _FOLDED:
+            return state, None
         surface = self.surface if self.projected else None
         step = self._newton_step(state, surface)
         if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost contact
             state = _indented_until_contact(self.body, state, self.settings.first_touch_mm)
             step = self._newton_step(state, surface)
-        return self.body.update_normals(state, step.projection), step if np.isfinite(step.largest()) else None
+        return self._facing(state, step), step if np.isfinite(step.largest()) else None
+
+    def _facing(self, state, step):
+        """The state whose potential a step lowers: with the planes at the step's end."""
+        return self.body.update_normals(state, step.projection)
 
     def _newton_step(self, state, surface):
         return self.body.newton_step(state, self.force, surface, largest_mm=self.settings.largest_step_mm,
@@ -167,9 +175,14 @@ class _Press:
         return min(1.0, self.settings.largest_step_mm / max(step.largest(), 1e-30))
 
     def moved(self, state, step, share):
-        trial = self.body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
-                                   state.indentation + share * step.indentation, step.projection, state.history)
+        slab, indentation = state.slab.displacement + share * step.slab, state.indentation + share * step.indentation
+        trial = self.body.evaluate(slab, state.support.displacement + share * step.support, indentation,
+                                   self._projection_at(slab, indentation, step), state.history)
         return None if trial is None else self.body.balanced(trial, self.tolerance)
+
+    def _projection_at(self, slab, indentation, step):
+        """The contact projection of a trial: the step's, so that each step decreases one potential."""
+        return step.projection
 
     def better(self, trial, state, residual):
         """Whether the potential decreases or, where rounding hides the difference near equilibrium, the residual."""
@@ -188,11 +201,29 @@ class _Press:
         if np.abs(trial.slab.displacement - state.slab.displacement).max() < _STILL_MM:
             self.projecting = False
         self.fresh = False
+        self.folded = self.folded + 1 if self.body.folds(trial) else 0
 
     def recovered(self, state):
         """Retry with new tangents of all cells and a constant contact projection, for which a step decreases the energy."""
-        if self.fresh and not self.projected:
+        if (self.fresh and not self.projected) or self.folded >= _FOLDED:
             return False
         self.body.cells.forget()
         self.projecting, self.fresh = False, True
         return True
+
+
+class _PressOfRounded(_Press):
+    """The same with an object with rounded edges, whose contact is a continuous function of the points' places.
+
+    So each trial is projected anew, and all steps decrease the same potential.
+    """
+
+    def prepared(self, state, iteration):
+        self.projected = self.projecting
+        return self.body.update_normals(state, self._projection_at(state.slab.displacement, state.indentation, None))
+
+    def _facing(self, state, step):
+        return state
+
+    def _projection_at(self, slab, indentation, step):
+        return self.body.slab.project(slab, self.surface, indentation)

@@ -256,11 +256,13 @@ def _advance(body, surface, state, reached, stage, settings):
     iterations or more, since the Newton step is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
     One that folds the cover, whether it converges or not, is repeated with a cover that resists, as in all increments after it.
     """
-    iterations, increment = 0, stage.end - reached
+    iterations, increment, settled = 0, stage.end - reached, body.has_points_of(state)
+    if not settled:      # an earlier stage from this state folded the cover
+        state = _resisting(body, surface, state)
     while True:
         at = min(stage.end, reached + increment, stage.reach(body, reached, settings))
         control = stage.control(at)
-        if settings.max_augmentations and stage.pressed(reached, state):
+        if settings.max_augmentations and settled and stage.pressed(reached, state):
             start = body.augmented(state, allowed_mm=0.0)     # overlaps at the start would grow with the force
         else:
             start = state
@@ -271,7 +273,8 @@ def _advance(body, surface, state, reached, stage, settings):
             found = augment(body, moved, found, control.force, settings)
             iterations += found.iterations
         if body.folds(found.last):
-            state, increment, iterations = body.resisting_folding(state), at - reached, 0
+            state = _resisting(body, surface, state)
+            increment, iterations, settled = at - reached, 0, False     # its overlaps are not those of its pressures
             continue
         if found.state is not None and at >= stage.end:
             return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
@@ -281,7 +284,12 @@ def _advance(body, surface, state, reached, stage, settings):
         if found.state is None and (increment < stage.smallest or iterations >= most_iterations(body, settings)):
             raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))
         if found.state is not None:
-            reached, state = at, found.state
+            reached, state, settled = at, found.state, True
+
+
+def _resisting(body, surface, state):
+    """The state with a cover that resists folding, under the object where it is."""
+    return body.resisting_folding(state, MovedSurface(surface, state.slab.projection.offset_mm))
 
 
 def _force(control, state):

@@ -365,14 +365,16 @@ class Slab:
         add_upper(whole.data, np.matmul(weighted.transpose(0, 2, 1), shapes), self._top_positions)
         return whole
 
-    def rubber_tangent(self, state: SlabState, condensed: list[np.ndarray], *, positive: bool = False,
+    def rubber_tangent(self, state: SlabState, condensed: list[np.ndarray], *, positive: float = 0.0,
                        workers: Workers = SERIAL) -> sp.csr_matrix:
         """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call.
 
-        positive: the elements' modes of negative stiffness are made positive
+        positive: share of the elements' modes of negative stiffness that is made positive
         """
         matrix = self._matrix
-        matrix.data[:] = self._beside_cells(state.displacement, positive, workers)
+        matrix.data[:] = self._beside_cells(state.displacement, False, workers)
+        if positive:
+            matrix.data += positive * (self._beside_cells(state.displacement, True, workers) - matrix.data)
         for part, positions in zip(condensed, self._positions[len(self.groups):], strict=True):
             add_upper(matrix.data, part, positions)
         if state.friction_response is not None:
@@ -397,7 +399,8 @@ class Slab:
                     history: ContactHistory) -> LinearGaps:
         """The `LinearGaps` of the object's contact points for a step of the global unknowns."""
         shapes, gaps = self.top.normal_shapes(projection), self.top.gaps(displacement, projection, indentation)
-        free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
+        covered = projection.covered.reshape(*shapes.shape[:2], 1) > 0
+        free = np.broadcast_to((self._top_dofs[:, None] >= 0) & covered, shapes.shape)
         points = np.broadcast_to(np.arange(len(gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
         columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
         rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))

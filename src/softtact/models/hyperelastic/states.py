@@ -25,7 +25,7 @@ class ContactHistory:
         return replace(self, friction=friction)
 
 
-# Heights (n,) and outward normals (n, 3) of an object's underside over places x (n,), y (n,).
+# Heights (n,) and outward normals (n, 3) of an object's underside over places x (n,), y (n,). Those of meshes are also `rounded`.
 ObjectSurface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
@@ -37,6 +37,7 @@ class ContactProjection:
     contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers the area in part (`contact/edges`)
     overrun (p,): points that were far under an edge when the projection was computed
     offset_mm (2,): displacement of the object along x and y from its position at first touch, included in the anchors
+    edge_radius_mm: of the object's edges, where the planes touch the object with rounded edges; 0 for those of its facets
     A point keeps its plane during a Newton step, so that each step decreases one potential.
     """
 
@@ -47,6 +48,7 @@ class ContactProjection:
     contact_compliance: np.ndarray
     offset_mm: np.ndarray = field(default_factory=lambda: np.zeros(2))
     overrun: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    edge_radius_mm: float = 0.0
 
     def taking(self, other: "ContactProjection", points: np.ndarray) -> "ContactProjection":
         """This projection with the planes of another one for some of the points (p,)."""

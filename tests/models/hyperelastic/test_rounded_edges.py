@@ -1,0 +1,59 @@
+"""The cover's contact points under an object with rounded edges."""
+
+import numpy as np
+import pytest
+import trimesh
+from support.bodies import small_body
+
+from softtact.contact.height_field import HeightField, MovedSurface
+from softtact.contact.rounded_object import REACH_MM
+from softtact.models.hyperelastic.rigid_contact import ROWS
+
+
+@pytest.fixture(scope="module")
+def body():
+    return small_body()
+
+
+@pytest.fixture
+def wavy(body):
+    """Displacements of the slab whose top is uneven."""
+    return 0.05 * np.random.default_rng(2).normal(size=body.rest()[0].shape)
+
+
+def box():
+    return trimesh.creation.box((2.0, 3.0, 4.0)).apply_translation([0.4, -0.3, 2.0])
+
+
+def rounding(body):
+    body.slab.top.round_edges(True)
+    return body.slab.top
+
+
+def test_gaps_are_distances_to_the_object_where_it_is_and_beyond_its_reach_points_count_for_nothing(body, wavy):
+    top, surface, offset = rounding(body), HeightField(box()), np.array([0.3, 0.2])
+    projection = top.project(wavy, MovedSurface(surface, offset), 0.1)
+    place = top.reference + top.at_points(wavy) + [*-offset, 0.1]
+    distance, _ = surface.rounded(place)
+    near = distance < REACH_MM
+    np.testing.assert_allclose(top.gaps(wavy, projection, 0.1)[near], distance[near], atol=1e-12)
+    assert projection.edge_radius_mm == surface.rounded.radius_mm > 0 and near.any()
+    assert (projection.covered == (distance < 1e3)).all() and (top.touch(wavy, projection, 0.1, top.fresh_history()).energy > 0)
+
+
+def test_points_too_deep_for_the_nearest_facet_to_be_known_are_below_the_facet_over_them(body, wavy):
+    top = rounding(body)
+    deep = 2.0
+    gaps = top.gaps(wavy, top.project(wavy, HeightField(box()), deep), deep)
+    heights = deep + (top.reference + top.at_points(wavy))[:, 2]
+    middle = np.abs((top.reference + top.at_points(wavy))[:, :2] - [0.4, -0.3]).max(axis=1) < 0.4
+    np.testing.assert_allclose(gaps[middle], -heights[middle], atol=1e-12)
+
+
+def test_the_faces_have_four_times_the_points_and_the_same_area(body):
+    area, points = body.slab.top.area.sum(), None
+    top = rounding(body)
+    points = len(top.area)
+    assert top.area.sum() == pytest.approx(area, rel=1e-12)
+    top.round_edges(False)
+    assert points == 4 * len(top.area) == 4 * ROWS**2 * len(top.faces)
