@@ -26,7 +26,8 @@ def made_up_press():
                        within_validity=np.array([1, 0], dtype=np.int8), validity_reason=np.array(["", "too deep"]),
                        x_mm=np.linspace(-11, 11, 3),
                        y_mm=np.linspace(-18.5, 18.5, 5), model="hyperelastic", sensor="coro", solver="dense",
-                       selection_reason="two words", least_volume_ratio=np.array([0.8, -0.1]), time_s=np.array([0.5, 10.5]),
+                       selection_reason="two words", least_volume_ratio=np.array([0.8, -0.1]),
+                       edge_radius_mm=np.array([0.0, 0.05]), time_s=np.array([0.5, 10.5]),
                        largest_counts=3000.0, **numbers,
                        attributes={"thickness_mm": 2.5, "tips_bonded": 1, "mesh_repairs": "", "friction": "none"})
 
