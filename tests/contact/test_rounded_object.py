@@ -73,6 +73,16 @@ def test_a_wall_too_thin_for_the_radius_has_a_smaller_one_and_its_faces_stay(thi
     np.testing.assert_allclose(distance, 0.01, atol=1e-12)
 
 
+def test_a_facet_without_an_area_changes_no_distance():
+    """Its corners have no normal along which they could be shrunk, and would stand out by the radius."""
+    box = trimesh.creation.box(SIDES)
+    needle = np.array([[0.0, 0.0, -2.0], [0.5, 0.0, -2.0], [1.0, 0.0, -2.0]])
+    with_needle = RoundedObject.of(np.vstack([box.vertices, needle]), np.vstack([box.faces, [[8, 9, 10], [0, 0, 1]]]))
+    distance, directions = with_needle(np.array([[0.2, 0.1, -2.1]]))
+    np.testing.assert_allclose(distance, 0.1, atol=1e-12)
+    np.testing.assert_allclose(directions, [[0.0, 0.0, -1.0]], atol=1e-12)
+
+
 def test_a_moved_surface_has_its_rounded_object_where_it_is():
     mesh, way = trimesh.creation.icosphere(subdivisions=3, radius=2.0), np.array([0.7, -0.4])
     surface, points = HeightField(mesh), np.random.default_rng(1).normal(size=(50, 3))

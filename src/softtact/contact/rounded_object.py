@@ -50,6 +50,7 @@ class RoundedObject:
     def of(cls, points: np.ndarray, facets: np.ndarray) -> "RoundedObject":
         """Of a closed surface with points (n, 3) in mm and facets (f, 3)."""
         mesh = trimesh.Trimesh(points, facets, process=True)      # merges the corners that facets share
+        mesh.update_faces(mesh.area_faces > 0)                    # facets without an area have no normal along which to shrink
         radius, corners = _shrunk_without_turning(mesh)
         triangles, normals = corners[mesh.faces], np.asarray(mesh.face_normals)
         low, high = triangles[..., :2].min(axis=1) - REACH_MM, triangles[..., :2].max(axis=1) + REACH_MM
@@ -85,7 +86,7 @@ def _shrunk_without_turning(mesh):
         corners = mesh.vertices + radius * inwards
         first, second, third = corners[mesh.faces].transpose(1, 0, 2)
         areas = np.einsum("ti,ti->t", np.cross(second - first, third - first), mesh.face_normals)
-        if (areas[mesh.area_faces > 0] > 0).all():
+        if (areas > 0).all():
             return radius, corners
     return 0.0, np.array(mesh.vertices)
 
