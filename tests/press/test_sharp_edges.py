@@ -31,6 +31,12 @@ def tilted_wall():
     return wall.apply_translation([0.1, 0.2, -wall.bounds[0, 2]])
 
 
+def resting_ball():
+    """A ball of 4 mm radius on the surface."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=4.0)
+    return ball.apply_translation([0.0, 0.0, -ball.bounds[0, 2]])
+
+
 def test_a_load_step_with_a_folded_cover_is_flagged_though_it_converged(monkeypatch):
     monkeypatch.setattr(LayeredBody, "folds", lambda self, state: False)      # elements that do not resist
     result = press(tilted_wall(), 2.0)
@@ -65,9 +71,7 @@ def test_a_stage_from_a_state_before_the_edges_were_rounded_begins_with_the_poin
 
 
 def test_edges_stay_sharp_where_the_cover_does_not_fold():
-    ball = trimesh.creation.icosphere(subdivisions=2, radius=4.0)
-    ball.apply_translation([0.0, 0.0, -ball.bounds[0, 2]])
-    assert press(ball, 1.0).edge_radius_mm[0] == 0.0
+    assert press(resting_ball(), 1.0).edge_radius_mm[0] == 0.0
 
 
 def test_every_step_under_rounded_edges_lowers_the_same_potential(monkeypatch):
@@ -80,18 +84,18 @@ def test_every_step_under_rounded_edges_lowers_the_same_potential(monkeypatch):
         return accepted
 
     monkeypatch.setattr(newton._PressOfRounded, "better", noting)
-    press(tilted_wall(), 2.0)
+    monkeypatch.setattr(LayeredBody, "folds", lambda self, state: not self.slab.resists_folding)     # from the start
+    press(resting_ball(), 2.0)
     followed = [(reached, begun) for (run, _, reached, accepted), (next_run, begun, *_) in pairwise(steps)
                 if accepted and run is next_run]
-    assert len(followed) > 5
+    assert len(followed) > 2
     for reached, begun in followed:
         assert begun == pytest.approx(reached, rel=1e-12)
 
 
 def test_a_cover_that_resists_folding_changes_a_map_without_folds_little(monkeypatch):
     """Both rules integrate polynomials of the third degree: 3.8 % on elements of 1.2 mm."""
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=4.0)
-    ball.apply_translation([0.0, 0.0, -ball.bounds[0, 2]])
+    ball = resting_ball()
     before = press(ball, 5.0)
     monkeypatch.setattr(LayeredBody, "folds", lambda self, state: not self.slab.resists_folding)     # from the start
     resisting, largest = press(ball, 5.0), before.deformation_map_mm.max()

@@ -15,7 +15,7 @@ from softtact.contact.penalty import Contact, penalty
 from softtact.geometry.meshes import place
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.models.hyperelastic import newton_step
-from softtact.models.hyperelastic.body import _REMEDIES, _first_remedy
+from softtact.models.hyperelastic.body import _REMEDIES, _first_remedy, _Remedy
 from softtact.models.hyperelastic.newton_step import ContactFactor, ContactStepper
 from softtact.models.hyperelastic.states import LinearGaps
 
@@ -260,4 +260,22 @@ def test_a_body_whose_tangent_is_not_positive_definite_is_given_one_that_is():
              (body.slab.rubber_tangent(state.slab, body.cells.positive_outer(), positive=positive).copy()
               for positive in (False, True))]
     assert least[0] < -0.01 and least[1] > -1e-3
+    body.close()
+
+
+def test_a_share_of_the_negative_modes_lies_between_the_tangent_and_the_one_without_them():
+    body, rng = small_body(), np.random.default_rng(3)
+    slab, support = body.rest()
+    slab += rng.normal(scale=0.02, size=slab.shape) * (body.slab.points[:, 2:] > -1.0)
+    support += rng.normal(scale=0.005, size=support.shape)
+    surface = HeightField(place(trimesh.creation.icosphere(subdivisions=2, radius=4.0), pose=None))
+    state = body.evaluate(slab, support, -1.0, body.slab.project(slab, surface))
+    body.cells.refresh(state)
+    positive = body.cells.positive_outer()
+    none, quarter, whole = (body._rubber_tangent(state, _Remedy(share, share), positive).data.astype(float)
+                            for share in (0.0, 0.25, 1.0))
+    assert np.abs(whole - none).max() > 1.0
+    np.testing.assert_allclose(quarter, none + 0.25 * (whole - none), atol=1e-5 * np.abs(whole).max())     # single precision
+    of_cells = body._rubber_tangent(state, _Remedy(cells=0.25), positive).data.astype(float)
+    assert np.abs(of_cells - none).max() > 1e-4 * np.abs(whole).max()
     body.close()
