@@ -1,12 +1,12 @@
-"""What stands beside the counts: taxels at the end of the converter's range, why load steps are flagged, and the sensor that an
-expected error is known of."""
+"""What stands beside the counts: taxels at the end of the converter's range, rounded edges, why load steps are flagged, and the
+sensor that an expected error is known of."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 
-from softtact.commands.press_summary import error_line, range_line, validity_lines
+from softtact.commands.press_summary import edge_line, error_line, range_line, validity_lines
 from softtact.press.result import PressResult
 from softtact.studies.hybrid.page import range_end_sentence
 
@@ -22,6 +22,12 @@ def test_the_summary_names_the_load_steps_at_which_taxels_are_at_the_end():
     (line,) = range_line(summary)
     assert line == "taxels at the end of the converter's range (2400 counts), which read too little: 2 at 50 N"
     assert not list(range_line(summary | {"taxels_at_range_end": [0, 0]})) and not list(range_line({}))
+
+
+def test_the_summary_names_the_load_steps_at_which_edges_were_rounded():
+    (line,) = edge_line({"edge_radius_mm": [0.0, 0.05, 0.05], "normal_force_n": [5.0, 10.0, 20.0]})
+    assert line.startswith("edges of the object rounded by 0.05 mm at 10, 20 N")
+    assert not list(edge_line({"edge_radius_mm": [0.0], "normal_force_n": [5.0]})) and not list(edge_line({}))
 
 
 def test_an_expected_error_of_another_sensor_says_which_sensor_it_is_known_of():

@@ -22,6 +22,8 @@ def summary_on_layers(result: Any) -> dict[str, Any]:
     facts["expected_error_interval"] = ([result.attributes[f"expected_error_times_{end}"] for end in ("low", "high")]
                                         if "expected_error_times_low" in result.attributes else None)
     facts["expected_error_calibrated_on"] = result.attributes.get("expected_error_calibrated_on")
+    if result.edge_radius_mm is not None:
+        load_steps["edge_radius_mm"] = result.edge_radius_mm
     return facts | _times(result) | {name: or_none(values) for name, values in load_steps.items()}
 
 
@@ -90,6 +92,7 @@ def _sure_lines(summary):
     if None not in summary["expected_error_mm"]:
         yield from error_line(summary)
     yield from range_line(summary)
+    yield from edge_line(summary)
     yield from validity_lines(summary)
     yield from _extrapolated_line(summary, of="a layer")
 
@@ -113,6 +116,15 @@ def range_line(summary: dict[str, Any]) -> Iterator[str]:
         steps = ", ".join(f"{number:g} at {plain(force, 4)} N"
                           for number, force in zip(numbers, summary["normal_force_n"], strict=True) if number)
         yield f"taxels at the end of the converter's range ({summary['largest_counts']:g} counts), which read too little: {steps}"
+
+
+def edge_line(summary: dict[str, Any]) -> Iterator[str]:
+    """The load steps in which the object's edges were rounded, and by how much."""
+    radii = summary.get("edge_radius_mm", [])
+    if any(radii):
+        forces = ", ".join(plain(force, 4) for force, radius in zip(summary["normal_force_n"], radii, strict=True) if radius)
+        yield (f"edges of the object rounded by {plain(max(radii), 3)} mm at {forces} N: sharper ones would have folded the "
+               "cover's elements; a finer mesh may bear them")
 
 
 def validity_lines(summary: dict[str, Any]) -> Iterator[str]:
