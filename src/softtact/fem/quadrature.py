@@ -39,6 +39,15 @@ def lobatto_rule(dimension: int) -> Quadrature:
     return Quadrature(x[places], w[places].prod(axis=1), degree=3)
 
 
+def lobatto_gauss_rule(dimension: int) -> Quadrature:
+    """Two fifths of Simpson's rule and three of Gauss's with two points a side: also points between the corners, and two degrees more.
+
+    Along a side the integral of x^4 is 2/5, of which Simpson's rule makes 2/3 and Gauss's 2/9.
+    """
+    simpson, inner = lobatto_rule(dimension), gauss_rule(2, dimension)
+    return Quadrature(np.vstack([simpson.points, inner.points]), np.append(0.4 * simpson.weights, 0.6 * inner.weights), degree=5)
+
+
 def triangle_rule() -> Quadrature:
     """Six points of the triangle (0, 0), (1, 0), (0, 1), of degree 4. (Dunavant, Int. J. Numer. Meth. Engng 21 (1985) 1129.)"""
     near, far = (0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)

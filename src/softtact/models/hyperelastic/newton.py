@@ -19,7 +19,7 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': beyond, elements of the default mesh may be unstable
 _ROUGH_SOON = 8     # iterations after which the rough tolerance applies beyond `DEEP`, or if it applied before an augmentation
-_FOLDED = 4        # iterations in turn with a folded cover that end a run; an element may fold on the way and unfold
+_ASTRAY = 4        # iterations in turn with a folded cover, or below the shell, that end a run; single ones may come back
 _NEARLY = 3.0      # factor of the allowed overlap if points are under an edge: their augmentation takes tens of steps
 
 
@@ -87,15 +87,18 @@ def _scale(force, settings):
 
 
 def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: float | None, tolerance: float,
-           settings: NewtonSettings) -> Solution:
-    """The `Solution` under a force (N) or at the state's indentation; with friction until friction and pressures agree."""
+           settings: NewtonSettings, *, deepest_mm: float = np.inf) -> Solution:
+    """The `Solution` under a force (N) or at the state's indentation; with friction until friction and pressures agree.
+
+    deepest_mm: indentation below which no balance is wanted; a run that stays there ends
+    """
     if not body.friction.active:
-        return _newton(body, surface, state, force, tolerance, settings)
+        return _newton(body, surface, state, force, tolerance, settings, deepest_mm)
     tolerance, iterations = settings.friction_tolerance * tolerance, 0
     for k in range(settings.friction_passes):
         if k == 1:     # otherwise the projection of a point at an edge would alternate between facets
             settings = replace(settings, projection_iterations=0)
-        found = _newton(body, surface, state, force, tolerance, settings)
+        found = _newton(body, surface, state, force, tolerance, settings, deepest_mm)
         iterations += found.iterations
         if found.state is None:
             break
@@ -109,9 +112,9 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
     return Solution(None, iterations, found.residual_n, found.last)
 
 
-def _newton(body, surface, state, force, tolerance, settings):
+def _newton(body, surface, state, force, tolerance, settings, deepest_mm):
     kind = _PressOfRounded if body.slab.top.rounds_edges else _Press
-    return solve(kind(body, surface, force, tolerance, settings), state, max_iterations=settings.max_iterations,
+    return solve(kind(body, surface, force, tolerance, settings, deepest_mm), state, max_iterations=settings.max_iterations,
                  nearly_n=settings.nearly_balanced * _scale(force, settings))
 
 
@@ -122,9 +125,10 @@ class _Press:
     object's height would jump each time; so the projection is kept later on, and where no step decreases the potential.
     """
 
-    def __init__(self, body, surface, force, tolerance, settings):
+    def __init__(self, body, surface, force, tolerance, settings, deepest_mm):
         self.body, self.surface, self.force, self.tolerance, self.settings = body, surface, force, tolerance, settings
-        self.projecting, self.fresh, self.projected, self.iterations, self.folded = True, False, False, 0, 0
+        self.deepest_mm = deepest_mm
+        self.projecting, self.fresh, self.projected, self.iterations, self.astray = True, False, False, 0, 0
 
     def prepared(self, state, iteration):
         self.projected = self.projecting and iteration < self.settings.projection_iterations
@@ -154,7 +158,7 @@ class _Press:
         return late and share > DEEP and residual <= settings.rough_tolerance * _scale(self.force, settings)
 
     def step(self, state):
-        if self.folded >= _FOLDED:
+        if self.astray >= _ASTRAY:
             return state, None
         surface = self.surface if self.projected else None
         step = self._newton_step(state, surface)
@@ -201,11 +205,11 @@ class _Press:
         if np.abs(trial.slab.displacement - state.slab.displacement).max() < _STILL_MM:
             self.projecting = False
         self.fresh = False
-        self.folded = self.folded + 1 if self.body.folds(trial) else 0
+        self.astray = self.astray + 1 if trial.indentation > self.deepest_mm or self.body.folds(trial) else 0
 
     def recovered(self, state):
         """Retry with new tangents of all cells and a constant contact projection, for which a step decreases the energy."""
-        if (self.fresh and not self.projected) or self.folded >= _FOLDED:
+        if (self.fresh and not self.projected) or self.astray >= _ASTRAY:
             return False
         self.body.cells.forget()
         self.projecting, self.fresh = False, True

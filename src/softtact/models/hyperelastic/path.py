@@ -58,6 +58,8 @@ class ByForce:
 
     end: float
     smallest: float
+    deepest_mm: float = np.inf
+    """Indentation at which the object rests on the shell; the stage ends with `_BelowShell` where it goes deeper."""
 
     def control(self, force: float) -> Control:
         return Control(force, 0.0, np.zeros(2))
@@ -95,6 +97,7 @@ class ByMotion:
     number: int
     """Number of the step, from 1 on."""
     end: float = 1.0
+    deepest_mm: float = np.inf
 
     @property
     def at_once(self) -> float:
@@ -146,6 +149,14 @@ class ToStop(ByMotion):
                 f"from {start:.0%} of that on no increment found a balance")
 
 
+class _BelowShell(ConvergenceError):
+    """No balance of a force was found before the object was below the shell on which it rests, from a state on."""
+
+    def __init__(self, message, state, reached):
+        super().__init__(message)
+        self.state, self.reached = state, reached
+
+
 def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterable[float], *, settings: NewtonSettings = DEFAULT,
                      touch_mm: float = 0.0, stop_mm: float = np.inf) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached.
@@ -173,13 +184,15 @@ def _stopped_at(load_step, force):
 
 def _up_to(body, surface, state, reached, force, stop_mm, settings):
     """The `LoadStep` of a force, and the load step at which the object rests on the shell, or None."""
-    failed = None
+    failed, stage = None, ByForce(force, settings.smallest_increment_n, stop_mm)
     try:
-        load_step = _advance(body, surface, state, reached, ByForce(force, settings.smallest_increment_n), settings)
+        load_step = _advance(body, surface, state, reached, stage, settings)
         if load_step.state.indentation <= stop_mm:
             return load_step, None
     except TimeLimitError:
         raise
+    except _BelowShell as error:
+        state, reached, failed = error.state, error.reached, error
     except ConvergenceError as error:      # the body alone may not carry the force
         if np.isinf(stop_mm):
             raise
@@ -187,9 +200,12 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
     largest = settings.largest_way_mm * (1.0 if body.friction.active else _LONGER_WITHOUT_FRICTION)
     stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, largest, 1), settings)
-    if failed is not None and stopped.state.force >= force:
+    if failed is None or stopped.state.force < force:
+        return stopped, stopped
+    if not isinstance(failed, _BelowShell):
         raise failed
-    return stopped, stopped
+    # The balance is above the shell, but the way to it is not.
+    return _advance(body, surface, state, reached, replace(stage, deepest_mm=np.inf), settings), None
 
 
 def _untouched(body, surface, indentation):
@@ -267,7 +283,8 @@ def _advance(body, surface, state, reached, stage, settings):
         else:
             start = state
         start, moved = _start_of_increment(body, surface, start, control, stage.growth(reached, at))
-        found = settle(body, moved, start, control.force, tolerance_at(_force(control, state), settings), settings)
+        found = settle(body, moved, start, control.force, tolerance_at(_force(control, state), settings), settings,
+                       deepest_mm=stage.deepest_mm)
         iterations += found.iterations
         if found.state is not None and at >= stage.end and not body.folds(found.state):
             found = augment(body, moved, found, control.force, settings)
@@ -280,6 +297,8 @@ def _advance(body, surface, state, reached, stage, settings):
             return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
                             residual_n=found.residual_n, penetration_mm=body.penetration(found.state),
                             rough=found.residual_n > tolerance_at(max(_force(control, state), found.state.force), settings))
+        if found.state is None and found.last.indentation > stage.deepest_mm:
+            raise _BelowShell(_failure(body, state, stage, reached, at, found.residual_n, iterations), state, reached)
         increment = 2 * increment if found.state is not None else 0.5 * (at - reached)
         if found.state is None and (increment < stage.smallest or iterations >= most_iterations(body, settings)):
             raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))

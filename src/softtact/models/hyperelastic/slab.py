@@ -19,7 +19,7 @@ from softtact.fem.elements import HEX20, QUAD8
 from softtact.fem.extruded_mesh import HexMesh, SheetMesh2D, extrude, interpolation_2d
 from softtact.fem.graded_mesh import CoverMesh, cover_mesh
 from softtact.fem.kernels import add_forces
-from softtact.fem.quadrature import lobatto_rule
+from softtact.fem.quadrature import lobatto_gauss_rule
 from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.fem.static_condensation import make_positive
 from softtact.linalg.symmetric_product import SymmetricProduct
@@ -238,7 +238,7 @@ class Slab:
     def _cover_block(self, hexes):
         rule, ratio = HEX20.reduced, self._quartic_penalty_ratio
         if self.resists_folding:
-            rule, ratio = lobatto_rule(3), max(ratio, _FOLDING_PENALTY_RATIO)
+            rule, ratio = lobatto_gauss_rule(3), max(ratio, _FOLDING_PENALTY_RATIO)
         return HexBlock(self.cover_mesh.points[hexes], self._cover_law, rule=rule, quartic_penalty_ratio=ratio)
 
     def resist_folding(self, resists: bool) -> None:
