@@ -9,7 +9,7 @@ from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
 from softtact.fem import elements
 from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET4, TET10, TRI3, TRI6, WEDGE18, Element, reference_gradients
-from softtact.fem.quadrature import gauss, lobatto_rule
+from softtact.fem.quadrature import gauss, lobatto_gauss_rule, lobatto_rule
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 
@@ -93,6 +93,15 @@ def test_lobattos_rule_has_the_corners_and_integrates_polynomials_of_the_third_d
     for powers in product(range(4), repeat=3):
         assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(HEX20, powers), abs=1e-14)
     assert rule.weights @ rule.points[:, 0]**4 != pytest.approx(integral(HEX20, (4, 0, 0)), abs=1e-6)
+
+
+def test_simpsons_and_gausss_rule_together_integrate_two_degrees_more_than_each():
+    rule = lobatto_gauss_rule(3)
+    assert len(rule.points) == 27 + 8 and (rule.weights > 0).all() and (np.abs(rule.points) == 1.0).all(axis=1).sum() == 8
+    for powers in product(range(6), repeat=3):
+        if sum(powers) <= rule.degree == 5:
+            assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(HEX20, powers), abs=1e-14)
+    assert rule.weights @ rule.points[:, 0]**6 != pytest.approx(integral(HEX20, (6, 0, 0)), abs=1e-6)
 
 
 def test_the_wedges_quadrature_integrates_the_square_of_its_quadratic_functions():

@@ -45,14 +45,14 @@ def test_a_load_step_with_a_folded_cover_is_flagged_though_it_converged(monkeypa
 
 
 def test_a_load_step_in_which_the_cover_would_fold_is_repeated_with_one_that_does_not_under_rounded_edges():
-    """Meshes half and a quarter as fine come down by 1.25 and 1.28 mm; with sharp edges the draft mesh does so by 1.22 mm."""
+    """Meshes half and a quarter as fine come down by 1.23 and 1.25 mm; with sharp edges the draft mesh does so by 1.22 mm."""
     result = press(tilted_wall(), 2.0, quality=MeshSettings.draft())
     assert result.least_volume_ratio[0] > 0.4 and result.within_validity[0] and result.edge_radius_mm[0] == EDGE_RADIUS_MM
     assert 1.05 < result.indentation_mm[0] < 1.3
 
 
 def test_a_wall_that_too_few_points_of_a_coarse_mesh_carry_is_flagged():
-    """Sharp, it comes down by 1.99 mm on this mesh, and by 1.28 mm on a fine one."""
+    """Sharp, it comes down by 1.99 mm on this mesh, and by 1.26 mm on a fine one."""
     result = press(tilted_wall(), 2.0)
     assert result.least_volume_ratio[0] > 0.4 and not result.within_validity[0]
     assert "fewer than 9 points" in result.validity_reason[0]
@@ -94,12 +94,12 @@ def test_every_step_under_rounded_edges_lowers_the_same_potential(monkeypatch):
 
 
 def test_a_cover_that_resists_folding_changes_a_map_without_folds_little(monkeypatch):
-    """Both rules integrate polynomials of the third degree: 3.8 % on elements of 1.2 mm."""
+    """Their points integrate polynomials of the fifth degree: 1.7 % on elements of 1.2 mm; with Simpson's points alone 3.8 %."""
     ball = resting_ball()
     before = press(ball, 5.0)
     monkeypatch.setattr(LayeredBody, "folds", lambda self, state: not self.slab.resists_folding)     # from the start
     resisting, largest = press(ball, 5.0), before.deformation_map_mm.max()
-    assert 0 < np.abs(resisting.deformation_map_mm - before.deformation_map_mm).max() < 0.05 * largest
+    assert 0 < np.abs(resisting.deformation_map_mm - before.deformation_map_mm).max() < 0.025 * largest
 
 
 def test_a_new_press_begins_with_elements_that_do_not_resist():

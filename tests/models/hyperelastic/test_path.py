@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from support.bodies import COARSE
+from support.bodies import COARSE, small_body
 from support.laws import LAWS
 from support.sensors import CORO
 
+from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
+from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
+from softtact.models.hyperelastic import newton, path
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps, press_motion
@@ -182,6 +185,43 @@ def test_a_depth_that_needs_more_force_than_the_sensor_bears_is_flagged():
     result = weak.press(ball(), motion=Motion().press(depth_mm=[0.15, 0.25]), model="hyperelastic", label="")
     bears = weak.spec.force_range_n[1]
     assert result.normal_force_n[0] < bears < result.normal_force_n[1] and result.within_validity.tolist() == [1, 0]
+
+
+def pressed_ball(force_n, **options):
+    """The load step of a ball on the small body, in a body of its own."""
+    body, surface = small_body(), HeightField(place(ball()))
+    load_step, = press_load_steps(body, surface, [force_n], settings=NewtonSettings.draft(), **options)
+    body.close()
+    return load_step
+
+
+def test_a_run_that_stays_below_the_shell_ends_there(monkeypatch):
+    """The shell stops the ball at 0.2 mm, which 20 N would press far deeper, in steps of 0.12 mm."""
+    depths, accepted = [], newton._Press.accepted
+
+    def noting(self, state, trial):
+        depths.append(trial.indentation)
+        accepted(self, state, trial)
+
+    monkeypatch.setattr(newton._Press, "accepted", noting)
+    load_step = pressed_ball(20.0, stop_mm=0.2)
+    assert load_step.state.indentation == pytest.approx(0.2) and load_step.force_n == 20.0
+    assert load_step.elsewhere_n == pytest.approx(20.0 - load_step.state.force) and 0 < load_step.state.force < 3.0
+    assert (np.array(depths) > 0.2).sum() == newton._ASTRAY
+
+
+def test_a_balance_above_the_shell_is_found_though_the_way_to_it_leads_below(monkeypatch):
+    advance = path._advance
+
+    def sent_below(body, surface, state, reached, stage, settings):
+        if stage.deepest_mm < np.inf:
+            raise path._BelowShell("below", state, reached)
+        return advance(body, surface, state, reached, stage, settings)
+
+    free = pressed_ball(0.5)
+    monkeypatch.setattr(path, "_advance", sent_below)
+    load_step = pressed_ball(0.5, stop_mm=1.5 * free.state.indentation)
+    assert load_step.elsewhere_n == 0.0 and load_step.state.indentation == pytest.approx(free.state.indentation, rel=1e-3)
 
 
 def test_the_deepest_place_goes_with_the_object():
