@@ -104,12 +104,13 @@ class TopContact:
         """The projection on the nearest places of the object with rounded edges; of points deep inside, on the facets over them."""
         rounded = surface.rounded
         place = self.reference + self.at_points(displacement) + [0.0, 0.0, indentation]
-        distance, normals = rounded(place)
+        distance, normals = rounded.averaged(place)
         height, over = surface(place[:, 0], place[:, 1])
         deep = (distance >= NO_CONTACT_MM) & (place[:, 2] > height)
         distance[deep], normals[deep] = (over[deep, 2] * (place[deep, 2] - height[deep])), over[deep]
         near = distance < NO_CONTACT_MM
-        anchors = np.where(near, place.T - distance * normals.T, np.array([[0.0], [0.0], [NO_CONTACT_MM]])).T
+        along = normals.T / np.einsum("pi,pi->p", normals, normals)      # means of directions are shorter than 1
+        anchors = np.where(near, place.T - distance * along, np.array([[0.0], [0.0], [NO_CONTACT_MM]])).T
         return ContactProjection(anchors=anchors, normals=normals, covered=near.astype(float), beside=~near,
                                  contact_compliance=np.zeros(len(near)), overrun=np.zeros(len(near), dtype=bool),
                                  offset_mm=np.asarray(getattr(surface, "offset_mm", (0.0, 0.0))), edge_radius_mm=rounded.radius_mm)
