@@ -19,7 +19,9 @@ from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 
 DEFAULT = NewtonSettings()
 _CLEAR_MM = 0.1        # height over the surface from which no contact acts
-_LONGER_WITHOUT_FRICTION = 3.0   # factor of increments without friction, where the result does not depend on the path
+# Factor of increments on the way to the shell without friction, where the result does not depend on the path. Under rounded edges
+# the contact is so stiff that what a step's limit leaves of an increment would tear the cover out of its balance, with 3,000 N.
+_LONGER_WITHOUT_FRICTION = 3.0
 _SMALLEST_SHARE = 1 / 64     # of the largest displacement in an increment; below it a motion's step fails
 
 
@@ -144,6 +146,10 @@ class ToStop(ByMotion):
 
     remedy = "Ask for smaller forces"
 
+    def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
+        short = body.friction.active or body.slab.top.rounds_edges
+        return start + self.at_once * (1.0 if short else _LONGER_WITHOUT_FRICTION)
+
     def failure(self, start: float, coordinate: float) -> str:
         return (f"The object did not reach the shell on which it rests, {self.after.indentation:.3g} mm below its pose: "
                 f"from {start:.0%} of that on no increment found a balance")
@@ -198,8 +204,8 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
             raise
         failed = error
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
-    largest = settings.largest_way_mm * (1.0 if body.friction.active else _LONGER_WITHOUT_FRICTION)
-    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, largest, 1), settings)
+    patient = replace(settings, max_iterations=4 * settings.max_iterations)
+    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, settings.largest_way_mm, 1), patient)
     if failed is None or stopped.state.force < force:
         return stopped, stopped
     if not isinstance(failed, _BelowShell):
