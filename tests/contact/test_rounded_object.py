@@ -65,6 +65,31 @@ def test_a_hole_keeps_its_walls_where_they_are():
     np.testing.assert_allclose(out, [-direction, -direction], atol=1e-9)
 
 
+def test_means_of_distances_turn_little_by_little_across_an_inner_edge():
+    """Facets of a bore of 64 sides meet at 5.6 degrees; a point between them would be pushed by one and by the other in turn."""
+    ring = rounded(trimesh.creation.annulus(r_min=2.0, r_max=4.0, height=3.0, sections=64))
+    angles = np.linspace(-0.02, 0.02, 2001)      # 40 um to both sides of an edge
+    points = np.column_stack([2.0 * np.cos(angles), 2.0 * np.sin(angles), 0.1 + 0 * angles])
+
+    def largest_turn(directions):
+        return np.degrees(np.linalg.norm(np.diff(directions, axis=0), axis=1)).max()
+
+    assert largest_turn(ring(points)[1]) == pytest.approx(360 / 64, rel=0.05)
+    assert largest_turn(ring.averaged(points)[1]) < 0.15 * 360 / 64
+    assert np.abs(ring.averaged(points)[0] - ring(points)[0]).max() < 1e-3
+
+
+def test_means_of_distances_are_those_of_the_points_at_faces_and_up_to_three_micrometres_more_at_edges_and_corners():
+    points = near_the_surface()
+    box = rounded(trimesh.creation.box(SIDES))
+    distance, mean = box(points)[0], box.averaged(points)[0]
+    near = np.abs(distance) < 0.02
+    inner = near & ((np.abs(points) > 0.5 * SIDES - EDGE_RADIUS_MM - 0.02).sum(axis=1) == 1)
+    assert inner.sum() > 50
+    np.testing.assert_allclose(mean[inner], distance[inner], atol=1e-12)
+    assert -1e-12 < (mean - distance)[near].min() and 1e-3 < (mean - distance)[near].max() < 3e-3
+
+
 @pytest.mark.parametrize(("thickness", "radius"), [(0.3, EDGE_RADIUS_MM), (0.09, EDGE_RADIUS_MM / 2), (0.005, 0.0)])
 def test_a_wall_too_thin_for_the_radius_has_a_smaller_one_and_its_faces_stay(thickness, radius):
     wall = rounded(trimesh.creation.box((thickness, 4.0, 4.0)))

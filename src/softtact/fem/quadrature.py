@@ -40,7 +40,7 @@ def lobatto_rule(dimension: int) -> Quadrature:
 
 
 def lobatto_gauss_rule(dimension: int) -> Quadrature:
-    """Two fifths of Simpson's rule and three of Gauss's with two points a side: also points between the corners, and two degrees more.
+    """Two fifths of Simpson's rule and three of Gauss's with two points a side: more points inside, and two degrees more.
 
     Along a side the integral of x^4 is 2/5, of which Simpson's rule makes 2/3 and Gauss's 2/9.
     """

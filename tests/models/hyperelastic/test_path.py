@@ -1,6 +1,7 @@
 """An object that moves on the hyperelastic sensor: down by depth or force, aside, and back."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -222,6 +223,15 @@ def test_a_balance_above_the_shell_is_found_though_the_way_to_it_leads_below(mon
     monkeypatch.setattr(path, "_advance", sent_below)
     load_step = pressed_ball(0.5, stop_mm=1.5 * free.state.indentation)
     assert load_step.elsewhere_n == 0.0 and load_step.state.indentation == pytest.approx(free.state.indentation, rel=1e-3)
+
+
+@pytest.mark.parametrize(("friction", "rounds", "increment"), [(False, False, 0.15), (True, False, 0.05), (False, True, 0.05)])
+def test_increments_to_the_shell_are_longer_where_neither_friction_nor_rounded_edges_forbid_it(friction, rounds, increment):
+    slab = SimpleNamespace(top=SimpleNamespace(rounds_edges=rounds))
+    body = SimpleNamespace(friction=SimpleNamespace(active=friction), slab=slab)
+    begin, end = (path.Control(None, depth, np.zeros(2)) for depth in (0.0, 1.0))
+    stage = path.ToStop(begin, end, 0.0, TIGHT.largest_way_mm, 1)
+    assert stage.control(stage.reach(body, 0.0, TIGHT)).indentation == pytest.approx(increment)
 
 
 def test_the_deepest_place_goes_with_the_object():

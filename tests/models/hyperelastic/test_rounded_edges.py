@@ -34,11 +34,23 @@ def test_gaps_are_distances_to_the_object_where_it_is_and_beyond_its_reach_point
     top, surface, offset = rounding(body), HeightField(box()), np.array([0.3, 0.2])
     projection = top.project(wavy, MovedSurface(surface, offset), 0.1)
     place = top.reference + top.at_points(wavy) + [*-offset, 0.1]
-    distance, _ = surface.rounded(place)
+    distance, _ = surface.rounded.averaged(place)
     near = distance < REACH_MM
     np.testing.assert_allclose(top.gaps(wavy, projection, 0.1)[near], distance[near], atol=1e-12)
     assert projection.edge_radius_mm == surface.rounded.radius_mm > 0 and near.any()
     assert (projection.covered == (distance < 1e3)).all() and (top.touch(wavy, projection, 0.1, top.fresh_history()).energy > 0)
+
+
+def test_gaps_change_with_the_points_as_their_normals_say(body, wavy):
+    """Where directions differ around a point its normal is shorter than 1; forces along it are the energy's derivative."""
+    top, surface = rounding(body), HeightField(box())
+    history, step = top.fresh_history(), 1e-6
+    way = 0.05 * np.random.default_rng(4).normal(size=wavy.shape)
+    touch = top.touch(wavy, top.project(wavy, surface, 0.1), 0.1, history)
+    before, after = (top.touch(at, top.project(at, surface, 0.1), 0.1, history).energy
+                     for at in (wavy - step * way, wavy + step * way))
+    lengths = np.linalg.norm(top.project(wavy, surface, 0.1).normals, axis=1)
+    assert (after - before) / (2 * step) == pytest.approx((touch.force * way[top.faces]).sum(), rel=1e-5) and lengths.min() < 0.99
 
 
 def test_points_too_deep_for_the_nearest_facet_to_be_known_are_below_the_facet_over_them(body, wavy):

@@ -125,7 +125,7 @@ class _Press:
     object's height would jump each time; so the projection is kept later on, and where no step decreases the potential.
     """
 
-    def __init__(self, body, surface, force, tolerance, settings, deepest_mm):
+    def __init__(self, body, surface, force, tolerance, settings, deepest_mm=np.inf):
         self.body, self.surface, self.force, self.tolerance, self.settings = body, surface, force, tolerance, settings
         self.deepest_mm = deepest_mm
         self.projecting, self.fresh, self.projected, self.iterations, self.astray = True, False, False, 0, 0
