@@ -90,6 +90,15 @@ def test_means_of_distances_are_those_of_the_points_at_faces_and_up_to_three_mic
     assert -1e-12 < (mean - distance)[near].min() and 1e-3 < (mean - distance)[near].max() < 3e-3
 
 
+def test_a_point_in_the_middle_of_a_wall_keeps_its_own_direction_to_one_side():
+    """The mean of both would be no direction at all."""
+    wall = rounded(trimesh.creation.box((0.3, 4.0, 4.0)))
+    point = np.array([[1e-4, 0.1, 0.2]])
+    for found, own in zip(wall.averaged(point), wall(point), strict=True):
+        np.testing.assert_array_equal(found, own)
+    assert wall(point)[0] == pytest.approx(-0.15 + 1e-4)
+
+
 @pytest.mark.parametrize(("thickness", "radius"), [(0.3, EDGE_RADIUS_MM), (0.09, EDGE_RADIUS_MM / 2), (0.005, 0.0)])
 def test_a_wall_too_thin_for_the_radius_has_a_smaller_one_and_its_faces_stay(thickness, radius):
     wall = rounded(trimesh.creation.box((thickness, 4.0, 4.0)))

@@ -30,6 +30,7 @@ _LEVEL = 0.02              # of the normals' largest moment: below it the facets
 _SAME = 1e-12              # mm2: squared distances that differ by less are of one point
 _ON_MM = 1e-6              # distance below which a point's direction is the facet's normal
 _INSIDE_MM = 0.2           # points deeper inside are not averaged: some of the sphere's might be out of reach
+_CLEAR = 0.5               # length of a mean of directions; in the middle of a wall its two sides' cancel each other
 _SPHERE_MM = 0.02          # of the means, which are 1.3 um more at rounded edges and 3 um at corners
 # Turned, so that an edge along an axis of the object parts its points one by one.
 _SPHERE = _SPHERE_MM * Rotation.from_euler("xyz", [0.3, 0.5, 0.7]).apply(trimesh.creation.icosahedron().vertices)
@@ -94,8 +95,9 @@ class RoundedObject:
         distance, directions = self(points)
         near = np.flatnonzero((distance > -_INSIDE_MM) & (distance < _SPHERE_MM))      # no point beyond touches the object
         around, along = self((points[near, None] + _SPHERE).reshape(-1, 3))
-        distance[near] = around.reshape(-1, len(_SPHERE)).mean(axis=1)
-        directions[near] = along.reshape(-1, len(_SPHERE), 3).mean(axis=1)
+        mean, slope = around.reshape(-1, len(_SPHERE)).mean(axis=1), along.reshape(-1, len(_SPHERE), 3).mean(axis=1)
+        clear = np.linalg.norm(slope, axis=1) > _CLEAR
+        distance[near[clear]], directions[near[clear]] = mean[clear], slope[clear]
         return distance, directions
 
 

@@ -1,10 +1,13 @@
 """The cover's contact points under an object with rounded edges."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 from support.bodies import small_body
 
+from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import HeightField, MovedSurface
 from softtact.contact.rounded_object import REACH_MM
 from softtact.models.hyperelastic.rigid_contact import ROWS
@@ -51,6 +54,19 @@ def test_gaps_change_with_the_points_as_their_normals_say(body, wavy):
                      for at in (wavy - step * way, wavy + step * way))
     lengths = np.linalg.norm(top.project(wavy, surface, 0.1).normals, axis=1)
     assert (after - before) / (2 * step) == pytest.approx((touch.force * way[top.faces]).sum(), rel=1e-5) and lengths.min() < 0.99
+
+
+def test_what_slides_is_across_a_normal_of_any_length(body, wavy):
+    """Across the direction of a normal shorter than 1, nothing of a movement along it is slip."""
+    top, surface = rounding(body), HeightField(box())
+    projection = top.project(wavy, surface, 0.1)
+    short = np.flatnonzero(np.linalg.norm(projection.normals, axis=1) < 0.99)
+    place = top._in_object(wavy, projection, 0.1)
+    unit = projection.normals / np.linalg.norm(projection.normals, axis=1, keepdims=True)
+    friction = replace(FrictionState.first(Coulomb(0.3), place - 1e-3 * unit, np.zeros(len(place))), pressure=np.ones(len(place)))
+    history = replace(top.fresh_history(), friction=friction)
+    traction = top.touch(wavy, projection, 0.1, history).friction_response.traction
+    assert len(short) > 3 and np.abs(traction[short]).max() < 1e-6
 
 
 def test_points_too_deep_for_the_nearest_facet_to_be_known_are_below_the_facet_over_them(body, wavy):

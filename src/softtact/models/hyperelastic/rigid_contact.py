@@ -161,7 +161,9 @@ class TopContact:
         """The contact with friction's energy and forces, which act on the covered area like the pressure."""
         area = self.area * projection.covered
         place = self._in_object(displacement, projection, indentation)
-        friction_response = friction_state.friction_response(place, projection.normals)
+        # Means of directions are shorter than 1; what slides is what is across them.
+        across = projection.normals / np.linalg.norm(projection.normals, axis=1, keepdims=True)
+        friction_response = friction_state.friction_response(place, across)
         pull = friction_response.traction * area[:, None]
         # The indentation moves the points upwards in the object's frame, so vertical slip components resist it.
         return replace(touch, energy=touch.energy + float(friction_response.energy @ area),
