@@ -9,8 +9,8 @@ the radius r. A point's distance from it is that from the object shrunk by r, le
 corners have moved into the object by r along the normals of all facets around them. Where a part is thinner than that, facets would
 turn over; a smaller r is taken then.
 
-Inner edges stay sharp so, those between the facets of a bore among them. A point in one would be pushed by one facet and by the
-other in turn, and Newton's method never ends. So distances near the surface are means over a small sphere (`averaged`).
+That leaves inner edges sharp, such as those between the facets of a bore. One facet and the other would push a point in one
+in turn, and Newton's method would never end. So distances near the surface are means over a small sphere (`averaged`).
 """
 
 from dataclasses import dataclass, replace

@@ -22,6 +22,7 @@ _CLEAR_MM = 0.1        # height over the surface from which no contact acts
 # Factor of increments on the way to the shell without friction, where the result does not depend on the path. Under rounded edges
 # the contact is so stiff that what a step's limit leaves of an increment would tear the cover out of its balance, with 3,000 N.
 _LONGER_WITHOUT_FRICTION = 3.0
+_PATIENCE = 4          # factor of the iterations on that way: a cover that slips off an edge took 65 of the largest length
 _SMALLEST_SHARE = 1 / 64     # of the largest displacement in an increment; below it a motion's step fails
 
 
@@ -204,7 +205,7 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
             raise
         failed = error
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
-    patient = replace(settings, max_iterations=4 * settings.max_iterations)
+    patient = replace(settings, max_iterations=_PATIENCE * settings.max_iterations)
     stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, settings.largest_way_mm, 1), patient)
     if failed is None or stopped.state.force < force:
         return stopped, stopped
