@@ -14,12 +14,14 @@ from softtact.evaluation.curve_shape import lower_shares
 from softtact.evaluation.decisions import NOT, REPRODUCED, UNDECIDED
 from softtact.files import write_dataset
 from softtact.geometry.generated import draw_objects
+from softtact.press.sensor import Sensor
 from softtact.studies.decide.claims import claims_of_decision
 from softtact.studies.decide.config import MODELS, load_study, read_values
 from softtact.studies.decide.hypotheses import Tables, hypothesis_table, shown_objects
 from softtact.studies.decide.policies import policy_scores
 from softtact.studies.decide.pressing import press_item, sensor_of
 from softtact.studies.decide.scoring import COLUMNS, SCORES, fit_gain
+from softtact.studies.decide.stages import presses as stages
 from softtact.studies.decide.stages.judging import with_flatness
 from softtact.studies.decide.stages.maps import map_robustness
 
@@ -167,6 +169,20 @@ def test_an_elastic_layer_twice_as_stiff_needs_twice_the_force_for_the_same_map(
     one, twice = (press_item(sensor_of(SMALL, model, young_mpa=factor * printed), model, tmp_path / "ball.stl", unit="mm",
                              forces_n=[factor]) for factor in (1.0, 2.0))
     np.testing.assert_allclose(twice.deformation_map_mm, one.deformation_map_mm, atol=1e-6)
+
+
+def test_a_press_takes_the_threads_of_its_job(tmp_path, monkeypatch):
+    """Beside another job, a press on all cores would wait for it at every step."""
+    trimesh.creation.icosphere(subdivisions=2, radius=4.0).export(tmp_path / "ball.stl")
+    model = {"kind": "elastic", "plane": "surface", "young_mpa": "printed"}
+    taken, press = [], Sensor.press
+    monkeypatch.setattr(Sensor, "press", lambda *args, **options: taken.append(options["threads"]) or press(*args, **options))
+    settings = {"name": "elastic", "model": model, "item": "ball", "unit": "mm", "forces_n": [1.0],
+                "items": [{"item": "ball", "unit": "mm"}]}
+    ball, one, many = (tmp_path / name for name in ("ball.stl", "one.nc", "many.nc"))
+    stages.press(inputs={"object": ball, "sensor": SMALL}, outputs={"press": one}, settings=settings, threads=3)
+    stages.press_fast(inputs={"objects": [ball], "sensor": SMALL}, outputs={"presses": [many]}, settings=settings, threads=2)
+    assert taken == [3, 2]
 
 
 def test_half_of_the_objects_at_a_hundredth_of_the_time_costs_half_and_is_not_told_from_it():

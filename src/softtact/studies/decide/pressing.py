@@ -56,15 +56,16 @@ def _elastic(path, model, young_mpa):
 
 
 def press_item(sensor: Sensor, model: Mapping[str, Any], mesh: str | Path, *, unit: str, forces_n: Sequence[float],
-               label: str = "") -> "xarray.Dataset":
+               label: str = "", threads: int = 1) -> "xarray.Dataset":
     """The data set of a press (as `PressResult.write` writes it) of a mesh file, centred over the sensor.
 
     A load step that is not reached is flagged, with those after it: their numbers are nan, `converged` and `within_validity` 0. A
     study of forty objects goes on without the last load step of one; a press without any fails.
+    threads: of the solver; Snakemake runs as many jobs beside each other as there are cores
     """
     started = os.getloadavg()[0] / (os.cpu_count() or 1)
     try:
-        result = sensor.press(read_mesh(mesh, unit=unit), force_n=forces_n, model=model["kind"], label=label)
+        result = sensor.press(read_mesh(mesh, unit=unit), force_n=forces_n, model=model["kind"], label=label, threads=threads)
     except ConvergenceError as error:
         if not isinstance(error.result, PressResult):
             raise

@@ -87,7 +87,7 @@ def press(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
     inputs: object (mesh), sensor, materials;  outputs: press;  settings: name, model, item, unit, forces_n
     """
     data = press_item(sensor_of(inputs["sensor"], settings["model"]), settings["model"], inputs["object"], unit=settings["unit"],
-                      forces_n=settings["forces_n"], label=f"{settings['name']}/{settings['item']}")
+                      forces_n=settings["forces_n"], label=f"{settings['name']}/{settings['item']}", threads=threads)
     _write(outputs["press"], data, settings["name"], settings["item"], settings)
 
 
@@ -101,7 +101,7 @@ def press_fast(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
     sensor = sensor_of(inputs["sensor"], settings["model"], young_mpa=young)
     for entry, mesh, path in zip(settings["items"], inputs["objects"], outputs["presses"], strict=True):
         data = press_item(sensor, settings["model"], mesh, unit=entry["unit"], forces_n=settings["forces_n"],
-                          label=f"{settings['name']}/{entry['item']}")
+                          label=f"{settings['name']}/{entry['item']}", threads=threads)
         _write(path, data, settings["name"], entry["item"], settings["model"])
 
 
