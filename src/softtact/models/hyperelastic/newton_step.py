@@ -29,6 +29,8 @@ from softtact.models.hyperelastic.states import LinearGaps, ObjectSurface, SlabS
 _SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some load steps
 # Share of the squared normals that a node's frame may neglect: when a frame is checked, and when it is chosen.
 _BENT, _SLIGHTLY_BENT = 0.02, 0.005
+_BENT_ROUNDED = 0.05         # factor of both under rounded edges, whose points are ten times as stiff: what frames neglect of them
+                             # would be stiffer than rubber, and every contact would want a new factorisation
 _ALIKE = 0.002               # of the sum of all points' stiffnesses: contacts that differ by less count as equal
 _LEAST_CORNER = 1e-9         # N/mm: keeps the object's stiffness positive despite rounding
 _INNER_STEPS = 12
@@ -64,10 +66,11 @@ class StepContact:
         change (p,): of the points' gaps in mm, so far in the step: points that it brought to the object count, too
         """
         gaps = self.points.gaps + np.minimum(change, 0.0)
-        now = self._frames_within(gaps, _SOON_MM, _BENT)
+        share = _BENT_ROUNDED if self._slab.top.rounds_edges else 1.0
+        now = self._frames_within(gaps, _SOON_MM, share * _BENT)
         if kept is not None and kept.covers(now):
             return kept.turned_as(now)
-        return self._frames_within(gaps, _NEAR_MM, _SLIGHTLY_BENT)
+        return self._frames_within(gaps, _NEAR_MM, share * _SLIGHTLY_BENT)
 
     def _frames_within(self, gaps, within_mm, bent):
         """Frames of nodes with smaller gaps; vectors are needed if the squared normals along them exceed the share `bent`."""
