@@ -1,0 +1,124 @@
+"""Keep the presses of a study that takes longer than one sitting in files small enough to be committed, and put them back.
+
+    python scripts/keep_presses.py keep config/decide.yaml
+    python scripts/keep_presses.py restore config/decide.yaml
+
+`keep` writes results/STUDY/presses/MODEL/ITEM.nc of the hyperelastic models, as far as they are there, to
+benchmarks/results/presses/STUDY/MODEL/ITEM.npz: 15 kB in place of 1 MB. Maps are rounded to 10 nm; fields that no later stage reads
+are left out. `restore` writes those that are missing back, if the study's settings are still those of their presses; the objects
+have to be drawn before, else the workflow takes them for newer. Snakemake then makes the rest.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import xarray
+
+from softtact.errors import InputError
+from softtact.files import PROVENANCE, atomic_path, digest, read_arrays, read_dataset, read_yaml
+from softtact.studies.registry import checked_study
+
+ROOT = Path(__file__).resolve().parents[1]
+RECORD = ROOT / "benchmarks" / "results" / "presses"
+MAP, STEP_MM = "deformation_map_mm", 1e-5
+
+
+def packed(data: xarray.Dataset) -> dict[str, np.ndarray]:
+    """The arrays of a press' record: the map as rounded differences, and all that has no value for each point of the map."""
+    rounded = np.round(data[MAP].values / STEP_MM)
+    there = np.isfinite(rounded).all(axis=(1, 2))      # a load step that was not reached has none
+    whole = np.where(there[:, None, None], rounded, 0).astype(np.int64)
+    for axis in range(3):
+        whole = np.diff(whole, axis=axis, prepend=0)
+    small = {name: one for name, one in data.variables.items() if not {"y", "x"} <= set(one.dims)}
+    about = {"attributes": data.attrs, "dims": {name: list(one.dims) for name, one in small.items()},
+             "of": {name: data[name].attrs for name in [*small, MAP]}}
+    return {"map": whole.astype(np.int32), "there": there, "about": np.array(json.dumps(about, default=_plain)),
+            **{name: one.values for name, one in small.items()}}
+
+
+def unpacked(arrays: dict[str, np.ndarray]) -> xarray.Dataset:
+    """The data set of a press' record, its map within 5 nm of the press'."""
+    about = json.loads(str(arrays["about"]))
+    whole = arrays["map"].astype(np.int64)
+    for axis in range(3):
+        whole = np.cumsum(whole, axis=axis)
+    maps = np.where(arrays["there"][:, None, None], STEP_MM * whole, np.nan)
+    variables = {name: (dims, arrays[name], about["of"][name]) for name, dims in about["dims"].items()}
+    attributes = {name: np.array(value) if isinstance(value, list) else value for name, value in about["attributes"].items()}
+    data = xarray.Dataset({MAP: (("step", "y", "x"), maps, about["of"][MAP]), **variables}, attrs=attributes)
+    return data.set_coords([name for name in ("x", "y") if name in data])
+
+
+def _plain(value):
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
+def keep(jobs: list, study: str) -> int:
+    """Write the records of the presses that are there and have none; how many."""
+    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True)
+    count = 0
+    for press, record, _ in _pairs(jobs, study):
+        if press.exists() and not record.exists():
+            record.parent.mkdir(parents=True, exist_ok=True)
+            data = read_dataset(press)
+            with atomic_path(record) as temporary:
+                np.savez_compressed(temporary.open("wb"), **packed(data.assign_attrs(commit=commit.stdout.strip())))
+            count += 1
+    return count
+
+
+def restore(jobs: list, study: str) -> tuple[int, int]:
+    """Write the presses that are missing and have a record; how many, and how many records are of other settings."""
+    missing = [path for job in jobs if job.stage == "draw_object" for path in job.made().values() if not Path(str(path)).exists()]
+    if missing:
+        raise InputError(f"{missing[0]} is missing, and {len(missing) - 1} more: draw the study's objects before its presses are "
+                         f"restored (snakemake --cores all --until draw_object --configfile FILE).")
+    count = other = 0
+    for press, record, settings in _pairs(jobs, study):
+        if press.exists() or not record.exists():
+            continue
+        with read_arrays(record) as arrays:
+            data = unpacked(dict(arrays.items()))
+        if data.attrs[PROVENANCE[1]] != digest(settings):
+            other += 1
+            continue
+        press.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_path(press) as temporary:
+            data.to_netcdf(temporary, engine="h5netcdf")
+        count += 1
+    return count, other
+
+
+def _pairs(jobs, study):
+    """(press, record, settings) of the jobs that press one item each."""
+    for job in jobs:
+        if job.stage == "press":
+            press = Path(str(job.made()["press"]))
+            yield press, RECORD / study / press.parent.name / f"{press.stem}.npz", job.settings
+
+
+def main() -> None:
+    """Keep or restore, and say how many."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("keep", "restore"))
+    parser.add_argument("configuration", type=Path)
+    options = parser.parse_args()
+    try:
+        opened = checked_study(read_yaml(options.configuration, missing="there is no such configuration."), options.configuration)
+        jobs, name = opened.jobs(f"results/{opened.study.name}"), opened.study.name
+        if options.what == "keep":
+            print(f"{keep(jobs, name)} presses kept in {(RECORD / name).relative_to(ROOT)}")
+        else:
+            count, other = restore(jobs, name)
+            print(f"{count} presses restored to results/{name}/presses; {other} records are of other settings and were left")
+    except InputError as error:
+        sys.exit(f"keep_presses: {error}")
+
+
+if __name__ == "__main__":
+    main()
