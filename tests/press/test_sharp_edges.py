@@ -105,6 +105,14 @@ def test_a_cover_that_resists_folding_changes_a_map_without_folds_little(monkeyp
     assert 0 < np.abs(resisting.deformation_map_mm - before.deformation_map_mm).max() < 0.025 * largest
 
 
+def test_points_under_rounded_edges_are_so_stiff_that_one_augmentation_serves(monkeypatch):
+    """As stiff as elsewhere, points at the wall's edge would need four of them to overlap by less than 4 um."""
+    count, augmented = [], LayeredBody.augmented
+    monkeypatch.setattr(LayeredBody, "augmented", lambda self, *of, **more: count.append(self) or augmented(self, *of, **more))
+    result = press(tilted_wall(), 2.0, quality=MeshSettings.draft())
+    assert result.penetration_mm[0] < 0.004 and len(count) < 3
+
+
 def test_the_rubber_keeps_its_factor_while_contacts_under_rounded_edges_change(monkeypatch):
     """What a node's frame neglects of points ten times as stiff would be stiffer than soft rubber: 88 factors in 21 iterations."""
     steppers, step = [], ContactStepper.step

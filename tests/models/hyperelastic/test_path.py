@@ -225,6 +225,21 @@ def test_a_balance_above_the_shell_is_found_though_the_way_to_it_leads_below(mon
     assert load_step.elsewhere_n == 0.0 and load_step.state.indentation == pytest.approx(free.state.indentation, rel=1e-3)
 
 
+def test_the_way_to_the_shell_is_given_more_iterations_than_a_load_step(monkeypatch):
+    """A cover that slips off an edge on that way takes 65 of the longest steps."""
+    given, newton_of = [], path.settle
+
+    def noting(body, surface, state, force, tolerance, settings, **options):
+        given.append((force, settings.max_iterations))
+        return newton_of(body, surface, state, force, tolerance, settings, **options)
+
+    monkeypatch.setattr(path, "settle", noting)
+    pressed_ball(20.0, stop_mm=0.2)
+    by_force, to_shell = ({most for force, most in given if (force is None) == way} for way in (False, True))
+    usual = NewtonSettings.draft().max_iterations
+    assert by_force == {usual} and 65 < min(to_shell) == max(to_shell)
+
+
 @pytest.mark.parametrize(("friction", "rounds", "increment"), [(False, False, 0.15), (True, False, 0.05), (False, True, 0.05)])
 def test_increments_to_the_shell_are_longer_where_neither_friction_nor_rounded_edges_forbid_it(friction, rounds, increment):
     slab = SimpleNamespace(top=SimpleNamespace(rounds_edges=rounds))
