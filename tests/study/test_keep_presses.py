@@ -47,7 +47,7 @@ def pressed(job):
     return read_dataset(path), path
 
 
-def test_a_press_comes_back_with_its_map_within_five_nanometres_and_all_else_as_it_was(script, tmp_path):
+def test_a_press_comes_back_with_its_map_rounded_to_a_tenth_of_a_micrometre_and_all_else_as_it_was(script, tmp_path):
     _, job = made = jobs(tmp_path)
     before, path = pressed(job)
     assert script.keep(made, "study") == 1 and script.keep(made, "study") == 0
@@ -55,7 +55,7 @@ def test_a_press_comes_back_with_its_map_within_five_nanometres_and_all_else_as_
     (tmp_path / "ball.stl").touch()
     assert script.restore(made, "study") == (1, 0)
     after = read_dataset(path)
-    np.testing.assert_allclose(after.deformation_map_mm, before.deformation_map_mm, rtol=0, atol=5.1e-6)     # nan stays nan
+    np.testing.assert_allclose(after.deformation_map_mm, before.deformation_map_mm, rtol=0, atol=5.1e-5)     # nan stays nan
     assert after.attrs.pop("commit")
     left = before.drop_vars(["displacement_mm", "deformation_map_mm"])
     xarray.testing.assert_identical(after.drop_vars("deformation_map_mm"), left)
