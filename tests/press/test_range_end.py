@@ -26,7 +26,7 @@ def test_the_summary_names_the_load_steps_at_which_taxels_are_at_the_end():
 
 def test_the_summary_names_the_load_steps_at_which_edges_were_rounded():
     (line,) = edge_line({"edge_radius_mm": [0.0, 0.05, 0.05], "normal_force_n": [5.0, 10.0, 20.0]})
-    assert line.startswith("edges of the object rounded by 0.05 mm at 10, 20 N")
+    assert line.startswith("edges of the object rounded by 0.05 mm at 10, 20 N") and "several balances" in line
     assert not list(edge_line({"edge_radius_mm": [0.0], "normal_force_n": [5.0]})) and not list(edge_line({}))
 
 

@@ -83,7 +83,8 @@ class PressResult:
     corners of its elements; 0 or less where one is folded under an edge. None of other models."""
     edge_radius_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step") | _LATER)
     """(step,) in mm of the hyperelastic model: by how much the object's edges were rounded, because the cover would have folded
-    under them; 0 where they are as sharp as the object's mesh. None of other models."""
+    under them; 0 where they are as sharp as the object's mesh. Where they are rounded, the cover may have several balances under
+    corners, of which a press finds one. None of other models."""
     iterations: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) iterations of the solver."""
     converged: np.ndarray = field(metadata=_array("1", "step"))
