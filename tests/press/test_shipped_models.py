@@ -12,7 +12,10 @@ from softtact.press import cache
 from softtact.sensors.frusta import Friction
 
 FILES = frustum_files()
-ROUND_OFF = 1e-6     # relative: the cell is solved to 1e-7 N of some 0.1 N
+ROUND_OFF = 1e-6     # relative, of what no iteration ends
+# Load steps of a frustum's law end at 3e-4 of the force, so a processor that rounds otherwise may do an iteration more. Between two
+# kinds compressions differ by up to 1.0e-3 of themselves, stiffnesses by 1.7e-4 of the largest.
+OF_COMPRESSIONS, OF_STIFFNESSES = 2e-3, 5e-4
 SENSORS = pytest.mark.parametrize("path", FILES, ids=[sensor.spec.name for sensor in FILES.values()])
 
 
@@ -80,8 +83,13 @@ def test_a_law_that_is_shipped_is_the_one_that_is_computed(path, forces):
     reached = {} if forces is None else {"pressure_mpa": shipped["force_n"][forces] / sensor.spec.dielectric.frusta.pitch_mm**2}
     made = frustum_law(sensor.spec, sensor.laws["dielectric"], **reached).arrays()
     for name, expected in shipped.items():
+        allowed = ROUND_OFF * np.abs(expected).max()
         if name in ("force_n", "compression_mm"):
             expected = expected[:len(made[name])]
-        elif name in ("lateral_at_mm", "stiffness") and forces:
-            continue      # at compressions that depend on the largest force
-        np.testing.assert_allclose(made[name], expected, rtol=0, atol=ROUND_OFF * np.abs(expected).max(), err_msg=name)
+        if name == "compression_mm":
+            allowed = OF_COMPRESSIONS * expected
+        elif name in ("lateral_at_mm", "stiffness"):      # at shares of the largest compression
+            if forces:
+                continue
+            allowed = OF_STIFFNESSES * np.abs(expected).max()
+        assert (np.abs(made[name] - expected) <= allowed).all(), name
