@@ -19,7 +19,7 @@ import numpy as np
 import xarray
 
 from softtact.errors import InputError
-from softtact.files import PROVENANCE, atomic_path, digest, read_arrays, read_dataset, read_yaml
+from softtact.files import PROVENANCE, atomic_path, digest, read_arrays, read_dataset, read_yaml, write_dataset
 from softtact.studies.registry import checked_study
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,8 +73,8 @@ def keep(jobs: list, study: str) -> int:
         if press.exists() and not record.exists():
             record.parent.mkdir(parents=True, exist_ok=True)
             data = read_dataset(press)
-            with atomic_path(record) as temporary:
-                np.savez_compressed(temporary.open("wb"), **packed(data.assign_attrs(commit=commit.stdout.strip())))
+            with atomic_path(record) as temporary, temporary.open("wb") as file:
+                np.savez_compressed(file, **packed(data.assign_attrs(commit=commit.stdout.strip())))
             count += 1
     return count
 
@@ -95,8 +95,7 @@ def restore(jobs: list, study: str) -> tuple[int, int]:
             other += 1
             continue
         press.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_path(press) as temporary:
-            data.to_netcdf(temporary, engine="h5netcdf")
+        write_dataset(press, data, seed=None, settings=settings)
         count += 1
     return count, other
 
