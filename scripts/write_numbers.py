@@ -47,7 +47,8 @@ def source(name: str) -> str:
     """The sentence that names a record, its date and its machine."""
     read = record(name)
     machine = read["machine"]
-    return f"`{name}.json`, {read['date'][:10]}, {machine['cores']} cores of an {machine['processor']} processor."
+    processor = machine["processor"].replace("(R)", "").removesuffix(" Processor")
+    return f"`{name}.json`, {read['date'][:10]}, {machine['cores']} cores of an {processor} processor."
 
 
 def count_tests() -> dict[str, int]:
