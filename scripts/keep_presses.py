@@ -66,11 +66,11 @@ def _plain(value):
 
 
 def keep(jobs: list, study: str) -> int:
-    """Write the records of the presses that are there and have none; how many."""
+    """Write the records of the presses that are there and have none, or one of other settings; how many."""
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=True)
     count = 0
-    for press, record, _ in _pairs(jobs, study):
-        if press.exists() and not record.exists():
+    for press, record, settings in _pairs(jobs, study):
+        if press.exists() and not (record.exists() and _of(_read(record), settings)):
             record.parent.mkdir(parents=True, exist_ok=True)
             data = read_dataset(press)
             with atomic_path(record) as temporary, temporary.open("wb") as file:
@@ -89,15 +89,24 @@ def restore(jobs: list, study: str) -> tuple[int, int]:
     for press, record, settings in _pairs(jobs, study):
         if press.exists() or not record.exists():
             continue
-        with read_arrays(record) as arrays:
-            data = unpacked(dict(arrays.items()))
-        if data.attrs[PROVENANCE[1]] != digest(settings):
+        data = _read(record)
+        if not _of(data, settings):
             other += 1
             continue
         press.parent.mkdir(parents=True, exist_ok=True)
         write_dataset(press, data, seed=None, settings=settings)
         count += 1
     return count, other
+
+
+def _read(record):
+    with read_arrays(record) as arrays:
+        return unpacked(dict(arrays.items()))
+
+
+def _of(data, settings):
+    """Whether a press was made with a job's settings."""
+    return data.attrs[PROVENANCE[1]] == digest(settings)
 
 
 def _pairs(jobs, study):

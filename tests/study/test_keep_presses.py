@@ -42,7 +42,7 @@ def pressed(job):
                            "validity_reason": ("step", np.array(["", "the load step was not reached"]))},
                           coords={"x": x, "y": y}, attrs={"model": "a", "wall_time_s": np.array([3.0, np.nan]), "tips_bonded": 1})
     path = Path(job.made()["press"])
-    path.parent.mkdir(parents=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_dataset(path, data, seed=None, settings=job.settings)
     return read_dataset(path), path
 
@@ -69,6 +69,16 @@ def test_a_press_of_other_settings_is_not_put_back(script, tmp_path):
     path.unlink()
     (tmp_path / "ball.stl").touch()
     assert script.restore(jobs(tmp_path, friction=0.3), "study") == (0, 1) and not path.exists()
+
+
+def test_a_record_of_other_settings_is_replaced_by_the_press_of_these(script, tmp_path):
+    for settings in ({}, {"friction": 0.3}):
+        _, job = made = jobs(tmp_path, **settings)
+        _, path = pressed(job)
+        assert script.keep(made, "study") == 1
+        path.unlink()
+    (tmp_path / "ball.stl").touch()
+    assert script.restore(made, "study") == (1, 0)
 
 
 def test_presses_are_put_back_after_the_objects_are_drawn(script, tmp_path):
