@@ -1,6 +1,6 @@
 """Contacts that nobody tuned for, on coro with the hyperelastic model: how many reach 20 N, or the force that crushes frusta?
 
-    python benchmarks/hard_contacts.py [--presses 100] [--set judged]     one press: --one NUMBER
+    python benchmarks/hard_contacts.py [--presses 100] [--set judged] [--workers 1]     one press: --one NUMBER
 
 Plugs, walls, boxes and rods, hollow and thin, one to three of them at two heights, tilted by up to 45 degrees, anywhere over the
 sensor, its sides and corners included; draft mesh, load steps 5, 10 and 20 N, or up to the force from which frusta may be crushed.
@@ -13,9 +13,11 @@ judged. The run goes on from where the record ends; record: benchmarks/results/h
 
 import argparse
 import json
+import multiprocessing
 import signal
 import time
 import warnings
+from functools import partial
 
 import numpy as np
 import record
@@ -133,24 +135,38 @@ def rows_of(name):
     return sets, here.get("rows", []) if here.get("seed") == SEED[name] else []
 
 
+def prepare():
+    """Load the sensor of this process, and listen to its processor's timer."""
+    global _sensor
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGPROF, _too_long)
+    _sensor = load_sensor("coro")
+    _sensor.mesh, _sensor.solver = MeshSettings.draft(), NewtonSettings.draft()
+    _sensor.prepared("foundation")
+
+
+def pressed(name, number):
+    """The row of one contact of a set."""
+    mesh, pose, bodies = contact(SEED[name], number, _sensor.spec)
+    return {"number": number, "bodies_and_tilts": bodies, **outcome(_sensor, mesh, pose)}
+
+
 def main():
     """Press on from the end of the record, and keep it after each press; or one press again."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--presses", type=int, default=100)
     parser.add_argument("--set", choices=SEED, default="judged", dest="name")
+    parser.add_argument("--workers", type=int, default=1, help="presses side by side, one thread each")
     parser.add_argument("--one", type=int, metavar="NUMBER")
     options = parser.parse_args()
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGPROF, _too_long)
-    sensor = load_sensor("coro")
-    sensor.mesh, sensor.solver = MeshSettings.draft(), NewtonSettings.draft()
-    sensor.prepared("foundation")
+    prepare()      # here, too, so that workers find what it caches
+    if options.one is not None:
+        print(pressed(options.name, options.one))
+        return
     sets, rows = rows_of(options.name)
-    for number in [options.one] if options.one is not None else range(len(rows), options.presses):
-        mesh, pose, bodies = contact(SEED[options.name], number, sensor.spec)
-        row = {"number": number, "bodies_and_tilts": bodies, **outcome(sensor, mesh, pose)}
-        print(row, flush=True)
-        if options.one is None:
+    with multiprocessing.get_context("spawn").Pool(options.workers, prepare) as workers:
+        for row in workers.imap(partial(pressed, options.name), range(len(rows), options.presses)):
+            print(row, flush=True)
             rows.append(row | {"why": row["why"][:200]})
             sets[options.name] = {"seed": SEED[options.name], **summary(rows), "rows": rows}
             record.write("hard_contacts", sets=sets)

@@ -56,6 +56,7 @@ class _Work:
         self._validation = case.samples(self._model, list(order[:kept]), "validation")
         self._training = list(order[kept:])
         self._test = case.samples(self._model, case.objects, "test")
+        self._done: dict[tuple[Any, ...], tuple[pd.DataFrame, dict[str, Any]]] = {}
 
     def scores(self) -> Iterator[pd.DataFrame]:
         """Scores of each seed."""
@@ -73,6 +74,13 @@ class _Work:
                    "error_share": scores.error_share.mean(), "ssim_own_range": scores.ssim_own_range.mean()}
 
     def _trained(self, architecture: str, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
+        """`_train`, once: the end of the curve is the first seed's training."""
+        key = architecture, tuple(chosen), seed
+        if key not in self._done:
+            self._done[key] = self._train(architecture, chosen, seed)
+        return self._done[key]
+
+    def _train(self, architecture: str, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
         """Scores of the best network of one training on some indenters, and what is known of the training."""
         from softtact.learning.network import predict
         from softtact.learning.settings import Training
