@@ -6,10 +6,10 @@ from softtact.models.newton import solve
 
 
 class Halving:
-    """A balance of which each step leaves half of what is unbalanced; it counts its steps."""
+    """A balance of which each step leaves half, or `left`, of what is unbalanced; it counts its steps."""
 
-    def __init__(self, tolerance):
-        self.tolerance, self.steps = tolerance, 0
+    def __init__(self, tolerance, *, left=0.5):
+        self.tolerance, self.left, self.steps = tolerance, left, 0
 
     def prepared(self, state, iteration):
         return state
@@ -21,7 +21,7 @@ class Halving:
         return residual <= self.tolerance
 
     def step(self, state):
-        return state, 0.5 * state
+        return state, (1 - self.left) * state
 
     def first_share(self, step):
         return 1.0
@@ -51,3 +51,11 @@ def test_it_ends_after_as_many_again():
     problem = Halving(tolerance=1 / 1024)
     found = solve(problem, 1.0, max_iterations=4, nearly_n=1.0)
     assert found.state is None and found.iterations == problem.steps == 8
+
+
+@pytest.mark.parametrize(("left", "steps", "reached"), [(0.9, 29, True), (0.93, 40, False), (0.96, 10, False)])
+def test_a_patient_run_goes_on_while_residuals_clearly_fall_up_to_so_many_times_its_iterations(left, steps, reached):
+    """In five steps the residual falls to 0.59, 0.70 and 0.82 of itself; 0.9^29 is the first power below 0.05, 0.93^40 is above."""
+    problem = Halving(tolerance=0.05, left=left)
+    found = solve(problem, 1.0, max_iterations=10, patience=4)
+    assert (found.state is not None) == reached and problem.steps == found.iterations == steps

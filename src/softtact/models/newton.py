@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 HALVINGS = 10     # of a step, before the line search fails
+_CLEARLY = 0.8    # share of former residuals below which the present ones are on their way to balance
 
 
 class Problem(Protocol):
@@ -59,27 +60,43 @@ class Solution:
     """The last state, at equilibrium or not."""
 
 
-def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0) -> Solution:
+def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0, patience: int = 2) -> Solution:
     """Solve a problem from a start state; `Solution.state` is None without convergence in `max_iterations`.
 
     nearly_n: if the residual is at most this after these iterations, as many more follow
+    patience: if more than 2, up to so many times the iterations follow as long as residuals fall (`_falls`)
     """
-    residual = float("inf")
-    for iteration in range(2 * max_iterations):
+    residuals: list[float] = []
+    limit = max_iterations
+    for iteration in range(max(2, patience) * max_iterations):
         state = problem.prepared(state, iteration)
-        residual = problem.residual(state)
-        if problem.balanced(state, residual):
-            return Solution(state, iteration, residual, state)
-        if iteration == max_iterations and residual > nearly_n:
-            return Solution(None, iteration, residual, state)
+        residuals.append(problem.residual(state))
+        if problem.balanced(state, residuals[-1]):
+            return Solution(state, iteration, residuals[-1], state)
+        if iteration == limit:
+            limit = _longer(limit, residuals, max_iterations, nearly_n, patience)
+            if iteration == limit:
+                return Solution(None, iteration, residuals[-1], state)
         state, step = problem.step(state)
-        trial = None if step is None else line_search(problem, state, step, residual)
+        trial = None if step is None else line_search(problem, state, step, residuals[-1])
         if trial is not None:
             problem.accepted(state, trial)
             state = trial
         elif not problem.recovered(state):
-            return Solution(None, iteration, residual, state)
-    return Solution(None, 2 * max_iterations, residual, state)
+            return Solution(None, iteration, residuals[-1], state)
+    return Solution(None, len(residuals), residuals[-1], state)
+
+
+def _longer(limit, residuals, max_iterations, nearly_n, patience):
+    """The number of iterations that may be taken after `limit` of them, or `limit`."""
+    if residuals[-1] <= nearly_n and limit < 2 * max_iterations:
+        return 2 * max_iterations
+    return limit + max_iterations // 2 if patience > 2 and _falls(residuals, max_iterations // 2) else limit
+
+
+def _falls(residuals, count):
+    """Whether the last `count` residuals are clearly smaller than those before: medians, as single ones jump."""
+    return bool(np.median(residuals[-count:]) < _CLEARLY * np.median(residuals[-2 * count:-count]))
 
 
 def line_search(problem: Problem, state: Any, step: Any, residual: float) -> Any:

@@ -20,6 +20,10 @@ _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': beyond, elements of the default mesh may be unstable
 _ROUGH_SOON = 8     # iterations after which the rough tolerance applies beyond `DEEP`, or if it applied before an augmentation
 _ASTRAY = 4        # iterations in turn with a folded cover, or below the shell, that end a run; single ones may come back
+# Under rounded edges: projections within the first steps, and how many times the iterations may be taken while residuals fall.
+# Points slip around an edge one after the other along it: a step that follows them around it is long and no descent, one with
+# their planes takes some of them, and half of the increment would begin with all of them again.
+_FOLLOWED, _CREEPING = 2, 4
 _NEARLY = 3.0      # factor of the allowed overlap if points are under an edge: their augmentation takes tens of steps
 
 
@@ -113,9 +117,9 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
 
 
 def _newton(body, surface, state, force, tolerance, settings, deepest_mm):
-    kind = _PressOfRounded if body.slab.top.rounds_edges else _Press
+    kind, patience = (_PressOfRounded, _CREEPING) if body.slab.top.rounds_edges else (_Press, 2)
     return solve(kind(body, surface, force, tolerance, settings, deepest_mm), state, max_iterations=settings.max_iterations,
-                 nearly_n=settings.nearly_balanced * _scale(force, settings))
+                 nearly_n=settings.nearly_balanced * _scale(force, settings), patience=patience)
 
 
 class _Press:
@@ -223,7 +227,7 @@ class _PressOfRounded(_Press):
     """
 
     def prepared(self, state, iteration):
-        self.projected = self.projecting
+        self.projected = self.projecting and iteration < _FOLLOWED
         return self.body.update_normals(state, self._projection_at(state.slab.displacement, state.indentation, None))
 
     def _facing(self, state, step):
