@@ -96,6 +96,19 @@ def test_every_step_under_rounded_edges_lowers_the_same_potential(monkeypatch):
         assert begun == pytest.approx(reached, rel=1e-12)
 
 
+def test_a_run_under_rounded_edges_follows_points_in_two_steps_and_goes_on_while_residuals_fall(monkeypatch):
+    """Points slip around an edge one after the other: more steps that follow them are no descent, fewer iterations begin anew."""
+    body, surface, followed, accepted = small_body(), HeightField(resting_ball()), [], newton._Press.accepted
+    monkeypatch.setattr(newton._Press, "accepted", lambda self, *of: followed.append(self.projected) or accepted(self, *of))
+    start = body.resisting_folding(newton.first_touch(body, surface, NewtonSettings.draft()), surface)
+    followed.clear()
+    hurried = replace(NewtonSettings.draft(), max_iterations=3, nearly_balanced=0.0)
+    found = newton.settle(body, surface, start, 2.0, 0.002, hurried)
+    assert found.state is not None and found.iterations > 3
+    assert followed == [True, True, *[False] * (found.iterations - 2)]
+    body.close()
+
+
 def test_a_cover_that_resists_folding_changes_a_map_without_folds_little(monkeypatch):
     """Their points integrate polynomials of the fifth degree: 1.7 % on elements of 1.2 mm; with Simpson's points alone 3.8 %."""
     ball = resting_ball()
