@@ -60,11 +60,11 @@ class Solution:
     """The last state, at equilibrium or not."""
 
 
-def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0, patience: int = 2) -> Solution:
+def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0, patience: int = 1) -> Solution:
     """Solve a problem from a start state; `Solution.state` is None without convergence in `max_iterations`.
 
     nearly_n: if the residual is at most this after these iterations, as many more follow
-    patience: if more than 2, up to so many times the iterations follow as long as residuals fall (`_falls`)
+    patience: up to so many times the iterations are taken, as long as residuals fall (`_falls`)
     """
     residuals: list[float] = []
     limit = max_iterations
@@ -91,7 +91,8 @@ def _longer(limit, residuals, max_iterations, nearly_n, patience):
     """The number of iterations that may be taken after `limit` of them, or `limit`."""
     if residuals[-1] <= nearly_n and limit < 2 * max_iterations:
         return 2 * max_iterations
-    return limit + max_iterations // 2 if patience > 2 and _falls(residuals, max_iterations // 2) else limit
+    longer = limit < patience * max_iterations and _falls(residuals, max_iterations // 2)
+    return limit + max_iterations // 2 if longer else limit
 
 
 def _falls(residuals, count):

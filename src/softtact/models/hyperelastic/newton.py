@@ -117,9 +117,10 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
 
 
 def _newton(body, surface, state, force, tolerance, settings, deepest_mm):
-    kind, patience = (_PressOfRounded, _CREEPING) if body.slab.top.rounds_edges else (_Press, 2)
+    kind = _PressOfRounded if body.slab.top.rounds_edges else _Press
+    creeping = body.slab.top.rounds_edges and force is not None      # the way to the shell, by depth, has a length of its own
     return solve(kind(body, surface, force, tolerance, settings, deepest_mm), state, max_iterations=settings.max_iterations,
-                 nearly_n=settings.nearly_balanced * _scale(force, settings), patience=patience)
+                 nearly_n=settings.nearly_balanced * _scale(force, settings), patience=_CREEPING if creeping else 1)
 
 
 class _Press:
