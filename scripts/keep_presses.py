@@ -13,6 +13,7 @@ import argparse
 import json
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -97,6 +98,11 @@ def restore(jobs: list, study: str) -> tuple[int, int]:
         write_dataset(press, data, seed=None, settings=settings)
         count += 1
     return count, other
+
+
+def commits(study: str) -> Counter[str]:
+    """{commit: presses that were kept at it}; empty for a study without records."""
+    return Counter(str(_read(record).attrs["commit"]) for record in sorted((RECORD / study).glob("*/*.npz")))
 
 
 def _read(record):

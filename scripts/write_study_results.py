@@ -11,6 +11,7 @@ from datetime import date
 from pathlib import Path
 
 import pandas as pd
+from keep_presses import commits
 from write_results import FOLDER, ROOT, git, markdown, small
 
 from softtact.errors import InputError
@@ -35,13 +36,24 @@ def keep(run: Path) -> dict[str, str]:
     for picture in sorted((run / "figures").glob("*.png")):
         small(picture, kept / picture.name)
     return {"date": date.today().isoformat(), "commit": git("rev-parse", "HEAD"),
-            "run": run_sentence(run_record(run / "benchmarks"))}
+            "run": run_sentence(run_record(run / "benchmarks")) + _sittings(run.name)}
+
+
+def _sittings(study):
+    """What is to be said of presses that were kept over several sittings."""
+    kept = commits(study)
+    return "" if not kept else " Its hyperelastic presses were made over several sittings and kept at the commits " + ", ".join(
+        f"`{commit}` ({count})" for commit, count in kept.most_common()) + "."
 
 
 def _refuse_outdated(run: Path) -> None:
-    """Refuse what is no finished run of this checkout: then the page's commit is that of the run."""
-    said = subprocess.run([sys.executable, "-m", "snakemake", "--configfile", f"config/{run.name}.yaml", "--dry-run"], cwd=ROOT,
-                          capture_output=True, text=True)
+    """Refuse what is no finished run of this checkout: then the page's commit is that of the run.
+
+    Presses that were kept at several commits are not made again for a later one; the page names them.
+    """
+    triggers = ["--rerun-triggers", "mtime"] if commits(run.name) else []
+    said = subprocess.run([sys.executable, "-m", "snakemake", "--configfile", f"config/{run.name}.yaml", "--dry-run", *triggers],
+                          cwd=ROOT, capture_output=True, text=True)
     if run.resolve() != ROOT / "results" / run.name or UP_TO_DATE not in said.stdout + said.stderr:
         raise InputError(f"{run}: is not a finished run of this checkout and its sources; run `make {run.name}` first.")
 

@@ -51,6 +51,7 @@ def test_a_press_comes_back_with_its_map_rounded_to_a_tenth_of_a_micrometre_and_
     _, job = made = jobs(tmp_path)
     before, path = pressed(job)
     assert script.keep(made, "study") == 1 and script.keep(made, "study") == 0
+    assert list(script.commits("study").values()) == [1] and not script.commits("another study")
     path.unlink()
     (tmp_path / "ball.stl").touch()
     assert script.restore(made, "study") == (1, 0)
