@@ -91,11 +91,11 @@ def ideal_of(spec: SensorSpec, maps_mm: np.ndarray) -> np.ndarray:
     return ideal_counts(spec, maps_mm, counts_per_relative_change=1.0)
 
 
-def formula_predictions(case: Case, model: str) -> Iterator[tuple[str, Samples, np.ndarray]]:
-    """(readout, samples, counts (n, row, column)) of the readouts that are no networks, for the objects' maps."""
+def formula_predictions(case: Case, model: str, *, items: Sequence[str] | None = None) -> Iterator[tuple[str, Samples, np.ndarray]]:
+    """(readout, samples, counts (n, row, column)) of the readouts that are no networks, for the maps of items, else of objects."""
     from softtact.evaluation.score_tables import make_predictors
 
-    train, test = case.samples(model, case.indenters, "train"), case.samples(model, case.objects, "test")
+    train, test = case.samples(model, case.indenters, "train"), case.samples(model, items or case.objects, "test")
     gain = fit_gain(ideal_of(case.spec, train.maps_mm), train.counts)
     yield GAP, test, np.clip(gain * ideal_of(case.spec, test.maps_mm), 0.0, case.spec.largest_counts)
     yield QUADRATIC, test, make_predictors(train, spec=case.spec, counts_per_relative_change=None)["quadratic"](test)
