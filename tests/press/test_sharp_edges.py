@@ -109,6 +109,24 @@ def test_a_run_under_rounded_edges_follows_points_in_two_steps_and_goes_on_while
     body.close()
 
 
+def test_forces_under_rounded_edges_at_most_double_and_long_runs_in_vain_leave_room_for_smaller_increments(monkeypatch):
+    """Three runs that went on to 120 iterations are more than a load step's 100, and no reason to give it up."""
+    body, surface, settings, forces = small_body(), HeightField(resting_ball()), NewtonSettings.draft(), []
+    start = body.resisting_folding(newton.first_touch(body, surface, settings), surface)
+    settle, in_vain = newton.settle, [1, 2, 3]
+
+    def noted(body, surface, state, force, *of, **more):
+        forces.append(force)
+        found = settle(body, surface, state, force, *of, **more)
+        return replace(found, state=None, iterations=120) if force > 1 and in_vain and in_vain.pop() else found
+
+    monkeypatch.setattr(path, "settle", noted)
+    load_step = path._advance(body, surface, start, 0.0, path.ByForce(2.0, 0.02), settings)
+    assert forces[:6] == pytest.approx([0.5, 1.0, 2.0, 1.5, 1.25, 1.125]) and not in_vain
+    assert load_step.force_n == 2.0 and load_step.iterations > 360
+    body.close()
+
+
 def test_a_cover_that_resists_folding_changes_a_map_without_folds_little(monkeypatch):
     """Their points integrate polynomials of the fifth degree: 1.7 % on elements of 1.2 mm; with Simpson's points alone 3.8 %."""
     ball = resting_ball()

@@ -113,6 +113,13 @@ def test_a_clear_effect_holds_and_its_flipped_sign_fails():
     assert flipped["detail"] == {"fails"} and flipped["choice"] == {"fails"}
 
 
+def test_a_matched_layer_that_scores_less_than_the_printed_one_is_no_control_of_stiffness():
+    scores = simulated(0.05)
+    scores.loc[scores.model == "matched", list(SCORES)] += [0.1, -0.1, -0.1, -0.1]
+    found = verdicts(tables_of(scores))
+    assert found["detail"] == {"holds"} and found["not_stiffness"] == {"undecided"}
+
+
 def test_no_effect_is_undecided():
     found = verdicts(tables_of(simulated(0.0)))
     assert found["detail"] == found["choice"] == {"undecided"}

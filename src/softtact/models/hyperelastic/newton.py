@@ -81,6 +81,16 @@ def most_iterations(body: LayeredBody, settings: NewtonSettings) -> int:
     return settings.friction_iterations if body.friction.active else settings.load_step_iterations
 
 
+def counted_iterations(body: LayeredBody, found: Solution, settings: NewtonSettings) -> int:
+    """Iterations of a run as they count against `most_iterations`.
+
+    Under rounded edges one that went on while residuals fell counts as one that did not: else a single one would use up all, and
+    none of half of its increment would follow.
+    """
+    creeping = body.slab.top.rounds_edges and not body.friction.active
+    return min(found.iterations, settings.max_iterations) if creeping else found.iterations
+
+
 def tolerance_at(force: float | None, settings: NewtonSettings) -> float:
     """Tolerance (N) of the residual at a force (N)."""
     return settings.relative_tolerance * _scale(force, settings)

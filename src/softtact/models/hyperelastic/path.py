@@ -14,7 +14,16 @@ from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
 from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.newton import DEEP, NewtonSettings, augment, first_touch, most_iterations, settle, tolerance_at
+from softtact.models.hyperelastic.newton import (
+    DEEP,
+    NewtonSettings,
+    augment,
+    counted_iterations,
+    first_touch,
+    most_iterations,
+    settle,
+    tolerance_at,
+)
 from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 
 DEFAULT = NewtonSettings()
@@ -68,10 +77,13 @@ class ByForce:
         return Control(force, 0.0, np.zeros(2))
 
     def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
-        """The largest force at an increment's end: with friction the result depends on the path, so forces at most double."""
-        if not body.friction.active:
+        """The largest force at an increment's end: with friction the result depends on the path, so forces at most double.
+
+        Under rounded edges they do, too: points slip around them one after the other, in longer increments many at a time.
+        """
+        if not (body.friction.active or body.slab.top.rounds_edges):
             return self.end
-        growth = settings.friction_growth
+        growth = settings.force_growth
         return max(growth * start, self.end / growth**2)
 
     def growth(self, start: float, coordinate: float) -> float:
@@ -279,7 +291,7 @@ def _advance(body, surface, state, reached, stage, settings):
     iterations or more, since the Newton step is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
     One that folds the cover, whether it converges or not, is repeated with a cover that resists, as in all increments after it.
     """
-    iterations, increment, settled = 0, stage.end - reached, body.has_points_of(state)
+    iterations, counted, increment, settled = 0, 0, stage.end - reached, body.has_points_of(state)
     if not settled:      # an earlier stage from this state folded the cover
         state = _resisting(body, surface, state)
     while True:
@@ -292,13 +304,13 @@ def _advance(body, surface, state, reached, stage, settings):
         start, moved = _start_of_increment(body, surface, start, control, stage.growth(reached, at))
         found = settle(body, moved, start, control.force, tolerance_at(_force(control, state), settings), settings,
                        deepest_mm=stage.deepest_mm)
-        iterations += found.iterations
+        iterations, counted = iterations + found.iterations, counted + counted_iterations(body, found, settings)
         if found.state is not None and at >= stage.end and not body.folds(found.state):
             found = augment(body, moved, found, control.force, settings)
             iterations += found.iterations
         if body.folds(found.last):
             state = _resisting(body, surface, state)
-            increment, iterations, settled = at - reached, 0, False     # its overlaps are not those of its pressures
+            increment, counted, settled = at - reached, 0, False     # its overlaps are not those of its pressures
             continue
         if found.state is not None and at >= stage.end:
             return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
@@ -307,7 +319,7 @@ def _advance(body, surface, state, reached, stage, settings):
         if found.state is None and found.last.indentation > stage.deepest_mm:
             raise _BelowShell(_failure(body, state, stage, reached, at, found.residual_n, iterations), state, reached)
         increment = 2 * increment if found.state is not None else 0.5 * (at - reached)
-        if found.state is None and (increment < stage.smallest or iterations >= most_iterations(body, settings)):
+        if found.state is None and (increment < stage.smallest or counted >= most_iterations(body, settings)):
             raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))
         if found.state is not None:
             reached, state, settled = at, found.state, True

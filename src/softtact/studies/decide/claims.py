@@ -85,8 +85,7 @@ def _collapsed(hypotheses, truths):
     own = hypotheses[(hypotheses.claim == "collapse")]
     shown = "; ".join(f"{one.truth}: {one.mean:+.3f} ({one.low:+.3f} to {one.high:+.3f}), {one.verdict}"
                       for one in own.itertuples())
-    decided = own.verdict.isin([HOLDS, FAILS])
-    verdict = UNDECIDED if not len(own) or not decided.all() else REPRODUCED if (own.verdict == HOLDS).all() else NOT
+    verdict = NOT if (own.verdict == FAILS).any() else REPRODUCED if len(own) and (own.verdict == HOLDS).all() else UNDECIDED
     return row("At equal step over indentation a hyperelastic sensor shows more of the lower feature than any elastic layer",
                "fig. 1, 7", "implied", shown or "no object shows both", verdict,
                "share of the raised features' deformation, against elastic layers of all moduli: two curves, not one",
