@@ -147,6 +147,13 @@ def test_the_collapse_counts_what_a_model_shows_more_than_the_elastic_layer_at_e
     assert table[table.claim == "collapse"]["mean"].tolist() == pytest.approx([0.7])      # .9 and .2 in `tables_of`
 
 
+def test_where_the_lower_feature_is_not_reached_the_collapse_does_not_count_how_the_cover_rises():
+    tables = tables_of(simulated(0.0), shown=0.9)
+    tables.collapse.loc[(tables.collapse.model == "a") & (tables.collapse.ratio == 1.0), "lower_share"] = -0.5
+    table = hypothesis_table(tables, statistics=STATISTICS, truths=["a"], seed=0)
+    assert table[table.claim == "collapse"]["mean"].tolist() == pytest.approx([0.7])
+
+
 def bump(x_mm, width_mm):
     """A map (21, 17) in mm of the small sensor: a round bump 0.1 mm deep."""
     y, x = np.meshgrid(np.linspace(-6, 6, 21), np.linspace(-4.8, 4.8, 17), indexing="ij")

@@ -88,7 +88,7 @@ def _collapsed(hypotheses, truths):
     verdict = NOT if (own.verdict == FAILS).any() else REPRODUCED if len(own) and (own.verdict == HOLDS).all() else UNDECIDED
     return row("At equal step over indentation a hyperelastic sensor shows more of the lower feature than any elastic layer",
                "fig. 1, 7", "implied", shown or "no object shows both", verdict,
-               "share of the raised features' deformation, against elastic layers of all moduli: two curves, not one",
+               "share of the raised features' deformation where the lower one is reached, against elastic layers of all moduli",
                "tables/collapse.csv", uncertainty="paired bootstrap over objects")
 
 

@@ -14,6 +14,7 @@ _FAMILY_COLOURS = {"elastic": colour("elastic"), "electrodes": "#b35806", "found
                    "hyperelastic": colour("hyperelastic")}
 _SHADES = {"smooth": 0.45, "stepped": 1.0}     # opacity of the bars
 _CROSSES = "x+1234"     # of elastic layers and of the foundation model, in turns
+_RINGS = "osD^v"        # of the hyperelastic model and of truths, in turns
 _SIGNS = {"undecided": "0.75", "holds": colour("hyperelastic"), "fails": colour("elastic")}
 
 
@@ -81,9 +82,9 @@ def draw_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     table = read_csv(inputs["collapse"])
     figure = pyplot().figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
-    crosses = itertools.cycle(_CROSSES)
+    crosses, rings = itertools.cycle(_CROSSES), itertools.cycle(_RINGS)
     for (family, model), own in table.groupby(["family", "model"], sort=False):
-        axes.plot(own.ratio, own.lower_share, "o" if family == "hyperelastic" else next(crosses), ms=4, mew=0.8, ls="", alpha=0.7,
+        axes.plot(own.ratio, own.lower_share, next(rings if family == "hyperelastic" else crosses), ms=4, mew=0.8, ls="", alpha=0.7,
                   color=_FAMILY_COLOURS[family], label=model, mfc="none" if model != "hyperelastic" else None)
     axes.set_xlim(0, min(4.0, float(table.ratio.max())) if len(table) else 1)
     axes.set_xlabel("step height over indentation (1)")
