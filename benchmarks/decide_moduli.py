@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import record
 
+from softtact.errors import InputError
 from softtact.evaluation.paired import compare
 from softtact.files import read_yaml
 from softtact.sensors.frusta import SensorSpec
@@ -82,13 +83,14 @@ def main(folder="results/decide"):
     study, folder = checked_study(read_yaml(CONFIG, missing="there is no such study."), CONFIG).study, Path(folder)
     sensor = found_sensor(study.values.sensor)
     printed = SensorSpec.from_yaml(sensor).elastic_layer.young_mpa
+    files = {"maps": folder / "maps.nc", "sensor": sensor}
+    cases = [read_case(files | {"readings": folder / f"readings/{truth}.nc"}) for truth in study.values.truths]
     maps = {}
     for young in sorted({*MODULI_MPA, printed}):
         maps[young] = pressed(study, young, folder)
         print(f"{young:g} MPa: {maps[young][1].mean():.0%} of the load steps are valid", flush=True)
     rows = []
-    for truth in study.values.truths:
-        case = read_case({"readings": folder / f"readings/{truth}.nc", "maps": folder / "maps.nc", "sensor": sensor})
+    for case in cases:
         for row in questions(case, maps, study):
             rows.append(row)
             print(*row.values(), flush=True)
@@ -96,4 +98,7 @@ def main(folder="results/decide"):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"decide_moduli: {error}")

@@ -229,6 +229,18 @@ def test_the_claims_follow_the_tests(gain, verdict):
     assert claims.verdict.iloc[-1] == REPRODUCED      # the curve's last step is 0.5 %
 
 
+@pytest.mark.parametrize(("shown", "verdict"), [(0.9, REPRODUCED), (0.1, NOT), (0.2, UNDECIDED)])
+def test_the_claim_of_two_curves_fails_where_one_of_its_tests_does(shown, verdict):
+    """Elastic layers show 0.2; the truth is one test of two, the other one holds."""
+    tables = tables_of(simulated(0.0), shown=shown)
+    table = hypothesis_table(tables, statistics=STATISTICS, truths=["a"], seed=0)
+    rows = pd.concat([table, table[table.claim == "collapse"].assign(truth="b", verdict="holds")])
+    curve = with_flatness(pd.DataFrame({"truth": "a", "model": "elastic", "share": [1.0], "indenters": [40], "error_share": [0.2]}))
+    claims = claims_of_decision({"hypotheses": rows, "collapse": tables.collapse, "learning_curve": curve}, statistics=STATISTICS,
+                                truths=["a"], printed=False)
+    assert claims.verdict.iloc[-2] == verdict
+
+
 def test_a_learning_curve_that_still_falls_is_not_flat():
     curve = pd.DataFrame({"truth": "a", "model": "elastic", "share": [0.5, 1.0], "error_share": [0.2, 0.15]})
     assert not with_flatness(curve).flat.any()

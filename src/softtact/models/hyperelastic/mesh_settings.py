@@ -136,7 +136,8 @@ class NewtonSettings:
     often
     full_depth_mm: for a smaller descent of the cover the allowed overlap is reduced in proportion: 1 um is 4 % of a light press
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
-    load_step_iterations: limit of all iterations of a load step;  friction_iterations: the same with friction, and for
+    load_step_iterations: limit of all iterations of a load step, of which a run under rounded edges counts at most
+    max_iterations;  friction_iterations: the same with friction, and for
     augmentations; a load step that converges slowly would take hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the tolerance of its residual
     largest_way_mm: largest displacement of an object in an increment of a `Motion`

@@ -307,7 +307,7 @@ def _advance(body, surface, state, reached, stage, settings):
         iterations, counted = iterations + found.iterations, counted + counted_iterations(body, found, settings)
         if found.state is not None and at >= stage.end and not body.folds(found.state):
             found = augment(body, moved, found, control.force, settings)
-            iterations += found.iterations
+            iterations, counted = iterations + found.iterations, counted + counted_iterations(body, found, settings)
         if body.folds(found.last):
             state = _resisting(body, surface, state)
             increment, counted, settled = at - reached, 0, False     # its overlaps are not those of its pressures
