@@ -20,9 +20,9 @@ from softtact.studies.decide.config import MODELS, load_study, read_values
 from softtact.studies.decide.hypotheses import Tables, hypothesis_table, shown_objects
 from softtact.studies.decide.policies import policy_scores
 from softtact.studies.decide.pressing import press_item, sensor_of
-from softtact.studies.decide.scoring import COLUMNS, SCORES, fit_gain
+from softtact.studies.decide.scoring import COLUMNS, SCORES, Case, fit_gain, mean_reading
 from softtact.studies.decide.stages import presses as stages
-from softtact.studies.decide.stages.judging import with_flatness
+from softtact.studies.decide.stages.judging import baseline_of_readouts, with_flatness
 from softtact.studies.decide.stages.maps import map_robustness
 
 STEPPED = draw_objects(0, 4, steps_mm=(0.1, 0.8), side_mm=22.0, seed=5)
@@ -70,6 +70,24 @@ def test_the_share_of_a_lower_feature_is_the_ratio_of_the_means():
 
 def test_one_gain_is_that_of_least_squares():
     assert fit_gain(np.array([1.0, 2.0]), np.array([2.0, 4.0])) == pytest.approx(2.0)
+
+
+def test_the_mean_reading_is_that_of_the_indenters_at_each_force_and_takes_no_object():
+    """Indenters read 10 and 30 at 1 N, 20 and 40 at 2 N; by hand 20 and 30, whatever the object reads."""
+    counts = np.array([[10.0, 20.0], [30.0, 40.0], [700.0, 900.0]])[:, :, None, None] * np.ones((1, 1, 7, 4))
+    case = Case(None, "a", ["ball", "bar", "cube"], ["indenters", "indenters", "stepped"], np.array([1.0, 2.0]), counts,
+                {"elastic": np.zeros((3, 2, 33, 57))}, np.ones((3, 2), dtype=bool))
+    samples, predicted = mean_reading(case)
+    assert samples.labels.item.tolist() == ["cube", "cube"]
+    assert predicted == pytest.approx(np.array([20.0, 30.0])[:, None, None] * np.ones((2, 7, 4)))
+
+
+def test_the_mean_reading_stands_beside_every_readout_of_its_truth():
+    scores = pd.DataFrame([("a", "elastic", "gap", 0.1), ("a", "elastic", "compact", 0.2), ("a", "mean_reading", "none", 0.8),
+                           ("b", "elastic", "gap", 0.1), ("b", "mean_reading", "none", 0.7)],
+                          columns=["truth", "model", "readout", "error_share"])
+    found = baseline_of_readouts(scores)[["truth", "readout", "error_share"]].values.tolist()
+    assert found == [["a", "gap", 0.8], ["a", "compact", 0.8], ["b", "gap", 0.7]]
 
 
 def simulated(gain, *, objects=12, scatter=0.01, seed=0):

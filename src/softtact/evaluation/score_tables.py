@@ -62,7 +62,7 @@ def taxel_table(indenters: "Sequence[Samples]") -> pd.DataFrame:
 def make_predictors(train: "Samples", *, spec: "AnySpec", counts_per_relative_change: float | None) -> dict[str, Predictor]:
     """{name: predictor} in the order of KINDS, those with parameters fitted to the training samples."""
     predictors: dict[str, Predictor] = {
-        "zeros": lambda samples: np.zeros_like(samples.counts), "mean_reading": _mean_reading(train),
+        "zeros": lambda samples: np.zeros_like(samples.counts), "mean_reading": mean_reading_predictor(train),
         "nearest_map": _nearest_map(train),
         "ridge": _ridge(train), "quadratic": _quadratic(train), "moved": lambda samples: moved_by_a_taxel(samples.counts),
         "halved": lambda samples: 0.5 * samples.counts}
@@ -77,7 +77,7 @@ def moved_by_a_taxel(counts: np.ndarray) -> np.ndarray:
     return np.concatenate([counts[:, :1], counts[:, :-1]], axis=1)
 
 
-def _mean_reading(train):
+def mean_reading_predictor(train: "Samples") -> Predictor:
     """The mean training reading at a force, interpolated linearly between the training forces and constant beyond them."""
     force = train.labels.force_n.to_numpy()
     known = np.unique(force)

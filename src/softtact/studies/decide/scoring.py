@@ -19,6 +19,7 @@ from softtact.sensors.frusta import SensorSpec
 from softtact.studies.decide.config import INDENTERS, MODELS
 
 GAP, QUADRATIC, COMPACT, PRINTED = READOUTS = ("gap", "quadratic", "compact", "printed")
+MEAN_READING, NO_READOUT = "mean_reading", "none"     # the contestant that reads no map: the trivial baseline of every readout
 SCORES = ["error_share", "ssim_own_range", "ssim_paper", "ssim_paper_whole"]
 COLUMNS = ["truth", "model", "readout", "seed", "object", "kind", "maps", *SCORES]
 PRIMARY = {"error_share": -1.0, "ssim_own_range": 1.0}     # and the sign with which more is better
@@ -99,6 +100,14 @@ def formula_predictions(case: Case, model: str, *, items: Sequence[str] | None =
     gain = fit_gain(ideal_of(case.spec, train.maps_mm), train.counts)
     yield GAP, test, np.clip(gain * ideal_of(case.spec, test.maps_mm), 0.0, case.spec.largest_counts)
     yield QUADRATIC, test, make_predictors(train, spec=case.spec, counts_per_relative_change=None)["quadratic"](test)
+
+
+def mean_reading(case: Case) -> tuple[Samples, np.ndarray]:
+    """Samples of the objects and, for each, the mean reading (n, row, column) of the indenters at its force."""
+    from softtact.evaluation.score_tables import mean_reading_predictor
+
+    train, test = (case.samples(next(iter(case.maps_mm)), items, "") for items in (case.indenters, case.objects))
+    return test, mean_reading_predictor(train)(test)
 
 
 def object_scores(samples: Samples, predicted: np.ndarray, *, window: int, data_range: float, **names: Any) -> pd.DataFrame:

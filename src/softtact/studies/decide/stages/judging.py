@@ -8,6 +8,7 @@ import pandas as pd
 from softtact.files import read_csv, read_dataset, read_json, write_csv
 from softtact.sensors.frusta import SensorSpec
 from softtact.studies.decide.config import MODELS
+from softtact.studies.decide.scoring import MEAN_READING
 
 _FLAT = 0.05     # of the error: what the last step of a learning curve may fall by and count as flat
 
@@ -38,7 +39,7 @@ def state_power(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
 
 def gather_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Join the scores of all truths, models and readouts, and add those of the policies.
+    """Join the scores of all truths, models and readouts, and add those of the policies and of the mean reading.
 
     inputs: formulas, networks, curves (lists of CSV), facts (JSON of the objects), presses_MODEL (lists, of the objects), sensor
     outputs: scores, choices (a row for each object), learning_curve (CSV)
@@ -50,10 +51,18 @@ def gather_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     choices = choice_table([read_json(path) for path in inputs["facts"]], presses, SensorSpec.from_yaml(inputs["sensor"]),
                            tolerance_mm=settings["tolerance_mm"])
     scores = pd.concat([read_csv(path) for path in [*inputs["formulas"], *inputs["networks"]]], ignore_index=True)
-    write_csv(outputs["scores"], pd.concat([scores, policy_scores(scores, choices)], ignore_index=True))
+    models = scores[scores.model != MEAN_READING]
+    write_csv(outputs["scores"], pd.concat([models, policy_scores(models, choices), baseline_of_readouts(scores)],
+                                           ignore_index=True))
     write_csv(outputs["choices"], choices)
     curves = pd.concat([read_csv(path) for path in inputs["curves"]], ignore_index=True)
     write_csv(outputs["learning_curve"], with_flatness(curves))
+
+
+def baseline_of_readouts(scores: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the mean reading, once for each readout of their truth, so that it stands beside each."""
+    read = scores[scores.model != MEAN_READING][["truth", "readout"]].drop_duplicates()
+    return scores[scores.model == MEAN_READING].drop(columns="readout").merge(read, on="truth")[scores.columns]
 
 
 def with_flatness(curve: pd.DataFrame) -> pd.DataFrame:

@@ -9,7 +9,18 @@ import pandas as pd
 
 from softtact.files import write_csv
 from softtact.studies.decide.config import MODELS
-from softtact.studies.decide.scoring import COLUMNS, COMPACT, PRINTED, Case, formula_predictions, object_scores, read_case
+from softtact.studies.decide.scoring import (
+    COLUMNS,
+    COMPACT,
+    MEAN_READING,
+    NO_READOUT,
+    PRINTED,
+    Case,
+    formula_predictions,
+    mean_reading,
+    object_scores,
+    read_case,
+)
 
 if TYPE_CHECKING:
     from softtact.learning.dataset import Samples
@@ -18,15 +29,17 @@ CURVE_COLUMNS = ["truth", "model", "share", "indenters", "maps", "best_epoch", "
 
 
 def score_formulas(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Score the gap formula with one gain and the quadratic, for all tested models against one truth.
+    """Score the gap formula with one gain and the quadratic, for all tested models against one truth, and the mean reading.
 
     inputs: readings, maps, sensor;  outputs: scores (CSV)
     settings: truth, seed, ssim_window
     """
     case = read_case(inputs)
-    frames = [object_scores(samples, predicted, window=settings["ssim_window"], data_range=case.spec.largest_counts,
+    predicted = [(model, *one) for model in MODELS for one in formula_predictions(case, model)]
+    predicted += [(MEAN_READING, NO_READOUT, *mean_reading(case))]
+    frames = [object_scores(samples, counts, window=settings["ssim_window"], data_range=case.spec.largest_counts,
                             truth=settings["truth"], model=model, readout=readout, seed=0)
-              for model in MODELS for readout, samples, predicted in formula_predictions(case, model)]
+              for model, readout, samples, counts in predicted]
     write_csv(outputs["scores"], pd.concat(frames)[COLUMNS])
 
 

@@ -51,7 +51,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     page.section("Scores")
     page.text("Means over objects and seeds. Error over the mean reading: sum of the errors over the sum of the readings. SSIM "
               "has either the range of each map, or the converter's with the smallest and the largest window that fits, for the "
-              "paper states none.")
+              "paper states none. The mean reading at a force reads no map, and is the same beside each readout.")
     page.table(mean_scores(tables["scores"]), file=inputs["scores"])
     for name, title in _TITLES.items():
         page.table(tables[name], title, file=inputs[name], most_rows=_MOST_ROWS)
