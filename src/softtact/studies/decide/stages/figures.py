@@ -9,6 +9,7 @@ from matplotlib.patches import Patch
 from softtact.evaluation.paired import compare
 from softtact.files import read_csv, read_dataset
 from softtact.reporting.style import colour, pyplot, save
+from softtact.studies.decide.scoring import MEAN_READING
 
 _FAMILY_COLOURS = {"elastic": colour("elastic"), "electrodes": "#b35806", "foundation": colour("foundation"),
                    "hyperelastic": colour("hyperelastic")}
@@ -39,13 +40,13 @@ def draw_maps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
 
 
 def draw_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Draw every contestant's error with its interval over objects: a panel for each truth and readout.
+    """Draw every contestant's error with its interval over objects: a panel for each truth and readout, the mean reading's above.
 
     inputs: scores;  outputs: png, svg;  settings: seed
     """
     scores = read_csv(inputs["scores"])
     truths, readouts = (list(dict.fromkeys(scores[name])) for name in ("truth", "readout"))
-    models = list(dict.fromkeys(scores.model))
+    models = [model for model in dict.fromkeys(scores.model) if model != MEAN_READING]
     figure = pyplot().figure(figsize=(2.9 * len(readouts) + 0.8, 2.1 * len(truths) + 0.4), layout="constrained")
     grid = figure.subplots(len(truths), len(readouts), squeeze=False, sharey=True)
     for (row, truth), (column, readout) in ((one, other) for one in enumerate(truths) for other in enumerate(readouts)):
@@ -53,10 +54,12 @@ def draw_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
         if not len(own):      # networks are not trained for every truth
             axes.set_axis_off()
             continue
-        axes.set_title(f"truth {truth}, {readout}", fontsize=8)
+        axes.set_title(f"truth {truth}, {readout}\n{_baseline_in_words(own)}", fontsize=8)
         axes.locator_params(axis="x", nbins=4)
         _bars(axes, own, models, settings["seed"])
         axes.set_xlabel("error over mean reading (1)")
+    grid[0, 0].set_yticks(range(len(models)), models)
+    grid[0, 0].invert_yaxis()      # of all panels, which share it
     figure.legend(handles=[Patch(color="0.3", alpha=shade, label=f"{kind} objects") for kind, shade in _SHADES.items()],
                   loc="outside upper center", ncols=2, fontsize=8)
     save(figure, outputs["png"], outputs["svg"])
@@ -73,8 +76,12 @@ def _bars(axes, rows, models, seed):
             spread = [[max(found.mean - found.low, 0)], [max(found.high - found.mean, 0)]] if np.isfinite(found.low) else None
             axes.barh(place + 0.4 * offset - 0.2, found.mean, 0.38, xerr=spread, color=colour(model), alpha=shade,
                       error_kw={"lw": 0.8})
-    axes.set_yticks(range(len(models)), models)
-    axes.invert_yaxis()
+
+
+def _baseline_in_words(rows):
+    """What the mean reading errs by, which would hide the contestants' differences as a bar."""
+    means = rows[rows.model == MEAN_READING].groupby("kind").error_share.mean()
+    return "mean reading: " + ", ".join(f"{means[kind]:.2f} ({kind})" for kind in _SHADES if kind in means)
 
 
 def draw_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

@@ -10,7 +10,8 @@ from softtact.reporting.page import Page, counted
 CAPTIONS = {
     "maps": "Maps of {shown} by the truths and the tested models, each with its own scale.",
     "scores": "Error over the mean reading of every contestant, in the mean over smooth (pale) and stepped objects; bars: 95 % "
-              "intervals, objects and seeds drawn with replacement. Ceiling and flipped are controls: a tested model is the truth.",
+              "intervals, objects and seeds drawn with replacement. Above each panel: the error of the mean reading at a "
+              "force. Ceiling and flipped are controls: a tested model is the truth.",
     "collapse": "The collapse: what a map shows of the lower feature against step height over indentation, at all forces. Crosses: "
                 "elastic layers of all moduli, and the foundation model; circles: hyperelastic.",
     "learning_curve": "Error of the compact network trained on growing shares of the indenters, with as many steps for each.",
