@@ -81,8 +81,13 @@ class _Jobs:
 
     def hyperelastic(self, name: str, model: Pressing, items: Sequence[DecideItem], forces: Sequence[float]) -> list[Job]:
         """One press a job."""
-        unit = "friction" if model.friction else "truth" if name in self.values.truths else "default"
-        unit = "draft" if model.mesh.get("preset") == "draft" and not model.friction else unit
+        draft = model.mesh == {"preset": "draft"}      # a truth may state a finer mesh than its preset's
+        if name in self.values.truths:
+            unit = "friction" if model.friction else "draft" if draft else "truth"
+        elif name == HYPERELASTIC:
+            unit = "draft" if draft else "default"
+        else:
+            unit = "far_draft" if draft else "far_default"
         made, common = f"{self.folder}/presses/{{model}}/{{item}}.nc", {"name": name, "model": model.model_dump(mode="json")}
         return [Job("press", {"object": self.mesh(item), **self.pressing}, {"press": made},
                     common | {"item": item.id, "unit": item.unit, "forces_n": list(forces)},
