@@ -31,7 +31,7 @@ $(TINY_STUDIES) skin probe grasps decide markers real: .venv/installed
 
 everything: study skin probe grasps decide markers real
 
-studies: $(filter-out tiny-decide,$(TINY_STUDIES))
+studies: $(TINY_STUDIES)
 
 # One page of Snakemake for each study that is finished: its figures and tables with the rules that made them.
 overview: .venv/installed
