@@ -87,7 +87,7 @@ class _Jobs:
         elif name == HYPERELASTIC:
             unit = "draft" if draft else "default"
         else:
-            unit = "far_draft" if draft else "far_default"
+            unit = "variant_draft" if draft else "variant_default"      # few forces, far apart
         made, common = f"{self.folder}/presses/{{model}}/{{item}}.nc", {"name": name, "model": model.model_dump(mode="json")}
         return [Job("press", {"object": self.mesh(item), **self.pressing}, {"press": made},
                     common | {"item": item.id, "unit": item.unit, "forces_n": list(forces)},
