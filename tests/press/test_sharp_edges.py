@@ -136,6 +136,21 @@ def test_a_cover_that_resists_folding_changes_a_map_without_folds_little(monkeyp
     assert 0 < np.abs(resisting.deformation_map_mm - before.deformation_map_mm).max() < 0.025 * largest
 
 
+def test_a_rough_balance_has_to_wait_twice_as_long_under_rounded_edges():
+    """Points that slip around an edge leave a residual between the tolerances for tens of iterations, and then none."""
+    body = small_body()
+    settings = replace(NewtonSettings.draft(), rough_after=20)
+    state = body.evaluate(*body.rest(), 0.0, far_above(body))
+    body.most_compressed = lambda state: (0.6, "")
+    between = 0.5 * settings.rough_tolerance * 20.0
+    for kind, first in ((newton._Press, 20), (newton._PressOfRounded, 40)):
+        problem = kind(body, plane, 20.0, newton.tolerance_at(20.0, settings), settings)
+        for iterations, enough in ((first - 1, False), (first, True)):
+            problem.iterations = iterations
+            assert problem.balanced(state, between) == enough
+    body.close()
+
+
 def test_points_under_rounded_edges_are_so_stiff_that_one_augmentation_serves(monkeypatch):
     """As stiff as elsewhere, points at the wall's edge would need four of them to overlap by less than 4 um."""
     count, augmented = [], LayeredBody.augmented

@@ -10,6 +10,7 @@ from support.bodies import small_body
 from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import HeightField, MovedSurface
 from softtact.contact.rounded_object import REACH_MM
+from softtact.models.hyperelastic.newton_step import StepContact
 from softtact.models.hyperelastic.rigid_contact import ROWS
 
 
@@ -85,3 +86,33 @@ def test_the_faces_have_four_times_the_points_and_the_same_area(body):
     assert top.area.sum() == pytest.approx(area, rel=1e-12)
     top.round_edges(False)
     assert points == 4 * len(top.area) == 4 * ROWS**2 * len(top.faces)
+
+
+def test_a_step_that_keeps_its_normals_has_the_gaps_of_its_end_and_is_corrected_once(body, wavy):
+    """Along planes a step leaves the object by the square of its length over twice its radius, and the contact is stiff."""
+    rounding(body)
+    surface, slab = HeightField(box()), body.slab
+    state = slab.evaluate(np.zeros_like(wavy), slab.project(np.zeros_like(wavy), surface, 0.1), 0.1)
+    contact = StepContact(slab, state, 0.1, surface, turning=False)
+    planes, step, lowered = contact.points, wavy.ravel()[slab.unknowns], 0.02
+
+    def linear(points):
+        return points.gaps + points.rows @ step + points.indentation_increment * lowered
+
+    moved = np.zeros_like(wavy)
+    moved.ravel()[slab.unknowns] = step
+    at_end = slab.project(moved, surface, 0.12)
+    near = (at_end.covered > 0) & (state.projection.covered > 0)
+    gaps = slab.top.gaps(moved, at_end, 0.12)[near]
+    assert np.abs(linear(planes)[near] - gaps).max() > 0.01
+    assert contact.follow(step, lowered) and not contact.follow(step, lowered)
+    np.testing.assert_allclose(linear(contact.points)[near], gaps, atol=1e-12)
+    assert contact.points.rows is planes.rows and (contact.points.gaps[~near] == planes.gaps[~near]).all() and not near.all()
+
+
+def test_a_step_that_is_cut_keeps_the_gaps_of_its_planes(body, wavy):
+    rounding(body)
+    surface, slab = HeightField(box()), body.slab
+    state = slab.evaluate(np.zeros_like(wavy), slab.project(np.zeros_like(wavy), surface, 0.1), 0.1)
+    contact = StepContact(slab, state, 0.1, surface, turning=False, largest_mm=0.1)
+    assert not contact.follow(wavy.ravel()[slab.unknowns], 0.02)

@@ -264,27 +264,29 @@ class LayeredBody:
         depth = state.indentation + by_mm
         return replace(state, slab=self.slab.update_normals(state.slab, state.slab.projection, depth), indentation=depth)
 
-    def newton_step(self, state: BodyState, force_n: float | None, surface: ObjectSurface | None = None, *,
+    def newton_step(self, state: BodyState, force_n: float | None, surface: ObjectSurface | None = None, *, turning: bool = True,
                     largest_mm: float = np.inf, kept_mm: float = 0.0) -> BodyStep:
         """The Newton step under a given force (N), or at constant indentation if `force_n` is None.
 
-        largest_mm: largest descent of the object;  kept_mm: cells that moved less since their last tangent keep it
+        turning: see `StepContact`;  largest_mm: largest descent of the object
+        kept_mm: cells that moved less since their last tangent keep it
 
         With a surface, the step uses the contact projection at its end, otherwise that of the state. Without any contact a
         free object has no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
         for number in range(_DAMPINGS):
-            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm, damped_before=number > 0)
+            self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
+            contact = StepContact(self.slab, state.slab, state.indentation, surface, turning=turning, largest_mm=largest_mm,
+                                  workers=self.workers)
+            step = self._newton_step(state, force_n, contact, largest_mm, damped_before=number > 0)
             if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.support)):
                 break
         return step
 
-    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm, *, damped_before):
+    def _newton_step(self, state, force_n, contact, largest_mm, *, damped_before):
         """The step with the present damping of the cells; damped_before: it was already computed with less damping."""
-        self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
-        contact = StepContact(self.slab, state.slab, state.indentation, surface, largest_mm=largest_mm, workers=self.workers)
         step, indentation_increment = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
                                                              largest_mm, damped_before=damped_before)
         full = np.zeros(3 * self.slab.nodes)

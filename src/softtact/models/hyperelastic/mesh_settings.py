@@ -143,7 +143,8 @@ class NewtonSettings:
     largest_way_mm: largest displacement of an object in an increment of a `Motion`
     max_iterations: of an increment, doubled if the residual is then at most nearly_balanced, a share of the force
     rough_tolerance: replaces relative_tolerance after rough_after iterations if frusta are compressed beyond `DEEP`: there they
-    continue to fold at constant force. Results flag such a load step.
+    continue to fold at constant force. Under rounded edges, where points may still slip, after twice as many. Results flag such a
+    load step.
     projection_iterations: number of iterations that update the contact projection
     kept_tangent_mm: a cell that moved less since its last tangent keeps it
     force_growth: largest ratio of the forces of two increments in turn, with friction and under rounded edges

@@ -169,26 +169,33 @@ class _Press:
         if self.iterations < _ROUGH_SOON or self.body.friction.active:
             return False
         share = self.body.most_compressed(state)[0]
-        late = self.iterations >= settings.rough_after or share > FULL_POCKET
+        late = self.iterations >= self._rough_after() or share > FULL_POCKET
         return late and share > DEEP and residual <= settings.rough_tolerance * _scale(self.force, settings)
+
+    def _rough_after(self):
+        return self.settings.rough_after
 
     def step(self, state):
         if self.astray >= _ASTRAY:
             return state, None
-        surface = self.surface if self.projected else None
-        step = self._newton_step(state, surface)
+        step = self._newton_step(state)
         if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost contact
             state = _indented_until_contact(self.body, state, self.settings.first_touch_mm)
-            step = self._newton_step(state, surface)
+            step = self._newton_step(state)
         return self._facing(state, step), step if np.isfinite(step.largest()) else None
 
     def _facing(self, state, step):
         """The state whose potential a step lowers: with the planes at the step's end."""
         return self.body.update_normals(state, step.projection)
 
-    def _newton_step(self, state, surface):
-        return self.body.newton_step(state, self.force, surface, largest_mm=self.settings.largest_step_mm,
+    def _newton_step(self, state):
+        surface, turning = self._followed()
+        return self.body.newton_step(state, self.force, surface, turning=turning, largest_mm=self.settings.largest_step_mm,
                                      kept_mm=self.settings.kept_tangent_mm)
+
+    def _followed(self):
+        """The surface that points follow within a step, or None, and whether their planes turn."""
+        return (self.surface if self.projected else None), True
 
     def first_share(self, step):
         return min(1.0, self.settings.largest_step_mm / max(step.largest(), 1e-30))
@@ -243,6 +250,13 @@ class _PressOfRounded(_Press):
 
     def _facing(self, state, step):
         return state
+
+    def _followed(self):
+        return self.surface, self.projected
+
+    def _rough_after(self):
+        """Twice as many as else: what is left may be of points that still slip around an edge, not of frusta that fold."""
+        return 2 * self.settings.rough_after
 
     def _projection_at(self, slab, indentation, step):
         return self.body.slab.project(slab, self.surface, indentation)

@@ -46,11 +46,15 @@ class StepContact:
     """The object's contact during a step from a `SlabState`; `planes` and `points` are its current projection and gaps.
 
     surface: for contact projections at the step's end; None: the points keep their planes
+    turning: the planes are those at the step's end; if not, they keep their normals and move once to where the gaps are those at
+    its end. Along a curved surface a step leaves its planes by more than the stiff contact allows, though it begins along them, and
+    its end is hardly better than its start (Maratos' effect; Nocedal and Wright, Numerical Optimization, 2nd ed., section 18.3).
     largest_mm: largest movement in a step; the projection of a longer step is taken where the step is cut
     """
 
     def __init__(self, slab: Slab, state: SlabState, indentation: float, surface: ObjectSurface | None = None, *,
-                 largest_mm: float = np.inf, workers: Workers = SERIAL) -> None:
+                 turning: bool = True, largest_mm: float = np.inf, workers: Workers = SERIAL) -> None:
+        self._turning = turning
         self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
         self._largest_mm = largest_mm
         self._face(state.projection)
@@ -88,21 +92,37 @@ class StepContact:
         return self._slab.product(rubber.data, step, workers=self._workers)
 
     def follow(self, step: np.ndarray, indentation_increment: float) -> bool:
-        """Update the contact projection for a step (unknowns,) in mm of the slab; returns whether there is a surface."""
-        if self._surface is None:
-            return False
+        """Update the contact projection for a step (unknowns,) in mm of the slab; returns whether it has changed anything."""
         share = min(1.0, self._largest_mm / max(np.abs(step).max(), abs(indentation_increment), 1e-30))
+        if self._surface is None or (share < 1.0 and not self._turning):
+            return False
+        if not self._turning:
+            self._correct(step, indentation_increment)
+            return True
         projection = self._projected(step, indentation_increment)
         if share < 1.0 and projection.overrun.any():
             projection = self._projected(share * step, share * indentation_increment)
         self._face(projection)
         return True
 
+    def _correct(self, step, indentation_increment):
+        """Take the gaps at a step's end, once; points that come to the object or leave it keep those of their planes."""
+        projection, depth = self._projected(step, indentation_increment), self._indentation + indentation_increment
+        at_end = self._slab.top.gaps(self._moved(step), projection, depth)
+        change = self.points.rows @ step + self.points.indentation_increment * indentation_increment
+        near = (projection.covered > 0) & (self.projection.covered > 0)
+        self.points = replace(self.points, gaps=np.where(near, at_end - change, self.points.gaps))
+        self._surface = None
+
     def _projected(self, step, indentation_increment):
         """The contact projection after a step."""
+        return self._slab.project(self._moved(step), self._surface, self._indentation + indentation_increment)
+
+    def _moved(self, step):
+        """The slab's displacement after a step."""
         displacement = self._state.displacement.copy()
         displacement.ravel()[self._slab.unknowns] += step
-        return self._slab.project(displacement, self._surface, self._indentation + indentation_increment)
+        return displacement
 
 
 class ContactFactor:
