@@ -11,3 +11,9 @@ def plain(value: float, digits: int = 3) -> str:
     rounded = round(value, decimals)
     text = f"{rounded:.{max(decimals, 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def numbered(count: int, noun: str) -> str:
+    """A number of things, such as "1 test" or "2 bodies"."""
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    return f"{count} {noun if count == 1 else plural}"

@@ -32,6 +32,7 @@ from softtact.geometry.meshes import (
     volume_of,
 )
 from softtact.geometry.polygons import triangulated
+from softtact.words import numbered
 
 _APART = 1e-5        # of the size: closer corners are one point with different rounding
 _FLAT_HOLE = 1e-3    # of the size: largest distance of a hole's rim from its plane
@@ -118,7 +119,7 @@ def _smooth_folds(mesh, repairs):
         return mesh
     if first:
         moved = np.linalg.norm(smooth.vertices - mesh.vertices, axis=1)
-        repairs.append(f"smoothed {_number(first, 'fold')} of small facets, as noise of a scan makes them: "
+        repairs.append(f"smoothed {numbered(first, 'fold')} of small facets, as noise of a scan makes them: "
                        f"{_count(moved > 0, 'corner')} moved by up to {moved.max():.2g} mm")
     return smooth
 
@@ -155,7 +156,7 @@ def _split_at_corners(mesh, repairs):
     faces, split = split_at_corners(mesh, edges, tolerance=_APART * _size(mesh))
     if not split:
         return mesh
-    repairs.append(f"split {_number(split, 'facet')} at corners of others that lie on the edges")
+    repairs.append(f"split {numbered(split, 'facet')} at corners of others that lie on the edges")
     return _of_faces(mesh.vertices, faces)
 
 
@@ -173,8 +174,8 @@ def _refuse_double_sided(path, mesh):
         if volume_of(body) > 0:
             body.invert()
         if not is_cavity(body, union_of([piece for piece in rest.split(only_watertight=False) if volume_of(piece) > 0])):
-            raise InputError(f"{path}: {_number(len(body.faces), 'facet')} of a closed surface are there front and back, so it has "
-                             "no inside; export the mesh with single-sided facets.")
+            raise InputError(f"{path}: {numbered(len(body.faces), 'facet')} of a closed surface are there front and back, so it "
+                             "has no inside; export the mesh with single-sided facets.")
 
 
 def _without_doubles(mesh, repairs):
@@ -183,7 +184,7 @@ def _without_doubles(mesh, repairs):
     keep, _ = _doubles(mesh.faces)
     if len(keep) == len(mesh.faces):
         return mesh
-    repairs.append(f"left out {_number(len(mesh.faces) - len(keep), 'facet')} of those that were there twice")
+    repairs.append(f"left out {numbered(len(mesh.faces) - len(keep), 'facet')} of those that were there twice")
     return _of_faces(mesh.vertices, mesh.faces[keep])
 
 
@@ -215,7 +216,7 @@ def _close_holes(mesh, repairs):
     if curved > _SMALL_HOLES * mesh.area:
         return mesh
     area = sum(area for _, area, _ in patches)
-    repairs.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
+    repairs.append(f"closed {numbered(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
     return _of_faces(mesh.vertices, np.vstack([mesh.faces, *(faces for faces, _, _ in patches)]))
 
 
@@ -290,7 +291,7 @@ def _turn_bodies(mesh, repairs):
         return mesh
     for piece in wrong:
         piece.invert()
-    several = f"turned {_number(len(wrong), 'body')} inside out"
+    several = f"turned {numbered(len(wrong), 'body')} inside out"
     repairs.append(several if len(pieces) > 1 else "turned all facets: they faced inwards")
     return trimesh.util.concatenate(pieces) if len(pieces) > 1 else pieces[0]
 
@@ -311,7 +312,7 @@ def _unite(mesh, repairs):
     for piece in pieces:
         if volume_of(piece) < 0:
             united = united - solid_of(piece, inverted=True)
-    repairs.append(f"united {_number(len(bodies), 'body')} that overlap or touch into {count}")
+    repairs.append(f"united {numbered(len(bodies), 'body')} that overlap or touch into {count}")
     raw = united.to_mesh64()
     return merge_facets(raw.vert_properties[:, :3][raw.tri_verts])
 
@@ -340,12 +341,7 @@ def _size(mesh):
 
 
 def _count(mask, noun):
-    return _number(int(mask.sum()), noun)
-
-
-def _number(count, noun):
-    plural = noun if count == 1 else "bodies" if noun == "body" else f"{noun}s"
-    return f"{count} {plural}"
+    return numbered(int(mask.sum()), noun)
 
 
 def split_at_corners(mesh: trimesh.Trimesh, open_edges: np.ndarray, *, tolerance: float) -> tuple[np.ndarray, int]:

@@ -10,6 +10,7 @@ from softtact.evaluation.decisions import COLUMNS, NOT, REPRODUCED, UNDECIDED, r
 from softtact.evaluation.paired import FAILS, HOLDS
 from softtact.studies.decide.config import CONTROLS
 from softtact.studies.decide.hypotheses import shown_objects
+from softtact.words import numbered
 
 _CLAIMS = {
     "detail": ("The hyperelastic model shows detail that the elastic one loses", "sec. 4.2, fig. 7", "by eye",
@@ -52,10 +53,11 @@ def _claim(claim, own):
     said = ", ".join(f"{number} {word}" for word in (HOLDS, FAILS, UNDECIDED) if (number := counts.get(word, 0)))
     spans = "; ".join(f"{score}: {part['mean'].min():.3g} to {part['mean'].max():.3g}" for score, part in own.groupby("score"))
     power = own.power.min()
-    uncertainty = (f"paired bootstrap over {int(own.objects.min())} objects and {int(own.seeds.max())} seeds, Holm over {len(own)} "
-                   "tests")
+    objects, seeds, tests = (numbered(*of) for of in ((int(own.objects.min()), "object"), (int(own.seeds.max()), "seed"),
+                                                      (len(own), "test")))
+    uncertainty = f"paired bootstrap over {objects} and {seeds}, Holm over {tests}"
     uncertainty += f"; stated power {power:.2f}" if np.isfinite(power) else ""
-    return row(words, where, paper, f"{len(own)} tests: {said}; mean differences {spans}", verdict, rule, "tables/hypotheses.csv",
+    return row(words, where, paper, f"{tests}: {said}; mean differences {spans}", verdict, rule, "tables/hypotheses.csv",
                uncertainty=uncertainty)
 
 
