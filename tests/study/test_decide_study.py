@@ -178,20 +178,37 @@ def bump(x_mm, width_mm):
     return 0.1 * np.exp(-((x - x_mm)**2 + y**2) / width_mm**2)
 
 
-def test_the_model_whose_maps_are_the_truths_is_nearer_in_the_map_of_robustness_but_few_objects_decide_nothing(tmp_path):
-    places = (-2.0, 0.0, 2.0)
-    widths = {"variants": 2.0, "presses_hyperelastic": 2.0, "presses_elastic": 3.5, "presses_matched": 3.0}
-    paths = {name: [tmp_path / f"{name}_{place}.nc" for place in places] for name in widths}
-    for name, width in widths.items():
-        for place, path in zip(places, paths[name], strict=True):
-            data = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), bump(place, width)[None]),
-                                   "normal_force_n": ("step", [2.5]), "within_validity": ("step", [1])})
+def map_of(tmp_path, maps, forces_n):
+    """Rows of the map of robustness of one truth; maps: {input: maps (step, y, x) of each object}."""
+    paths = {name: [tmp_path / f"{name}_{number}.nc" for number in range(len(each))] for name, each in maps.items()}
+    for name, each in maps.items():
+        for path, steps in zip(paths[name], each, strict=True):
+            data = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), np.array(steps)),
+                                   "normal_force_n": ("step", forces_n), "within_validity": ("step", [1] * len(forces_n))})
             write_dataset(path, data, seed=None, settings={})
     map_robustness(inputs=paths | {"sensor": SMALL}, outputs={"robustness": tmp_path / "robustness.csv"},
-                   settings={"variants": [{"law": "made_up"}], "objects": list(places), "seed": 0, "statistics": STATISTICS})
-    row = pd.read_csv(tmp_path / "robustness.csv").iloc[0]
+                   settings={"variants": [{"law": "made_up"}], "objects": list(range(len(paths["variants"]))), "forces_n": forces_n,
+                             "seed": 0, "statistics": STATISTICS})
+    return pd.read_csv(tmp_path / "robustness.csv")
+
+
+def test_the_model_whose_maps_are_the_truths_is_nearer_in_the_map_of_robustness_but_few_objects_decide_nothing(tmp_path):
+    widths = {"variants": 2.0, "presses_hyperelastic": 2.0, "presses_elastic": 3.5, "presses_matched": 3.0}
+    table = map_of(tmp_path, {name: [[bump(place, width)] for place in (-2.0, 0.0, 2.0)] for name, width in widths.items()}, [2.5])
+    row = table.iloc[0]
+    assert len(table) == 1 and row.force_n == "all"
     assert row.error_hyperelastic == pytest.approx(0, abs=1e-9) and row.gain_over_elastic > row.gain_over_matched > 0.05
     assert row.verdict_over_elastic == row.verdict_over_matched == UNDECIDED
+
+
+def test_a_layer_right_at_each_force_but_for_a_factor_is_wrong_at_all_together_in_the_map_of_robustness(tmp_path):
+    """The best gain turns readings of 1 and 2 into .8 and 1.6 in place of 1 and 1.5: an error of .3 over 2.5."""
+    growth = {"variants": 1.5, "presses_hyperelastic": 1.5, "presses_elastic": 2.0, "presses_matched": 2.0}
+    small = {place: 1e-3 * bump(place, 2.0) for place in (-2.0, 0.0, 2.0)}      # readings are nearly linear in such deformations
+    table = map_of(tmp_path, {name: [[one, factor * one] for one in small.values()] for name, factor in growth.items()}, [1.0, 2.0])
+    assert list(table.force_n) == ["all", "1.0", "2.0"]
+    np.testing.assert_allclose(table.error_elastic, [0.12, 0.0, 0.0], atol=0.01)
+    np.testing.assert_allclose(table.error_hyperelastic, 0.0, atol=1e-9)
 
 
 def test_an_elastic_layer_twice_as_stiff_needs_twice_the_force_for_the_same_map(tmp_path):

@@ -192,8 +192,10 @@ class _Jobs:
         inputs: dict[str, Any] = {f"presses_{model}": self.presses(model, few) for model in ("elastic", MATCHED, HYPERELASTIC)}
         return Job("map_robustness", {"variants": [path for name, _, _ in variants for path in self.presses(name, few)], **inputs,
                                       **self.sensor},
-                   {"robustness": table}, {"variants": [varied for _, varied, _ in variants], "objects": [item.id for item in few],
-                                           "seed": self.values.seed, "statistics": self.values.statistics.model_dump(mode="json")})
+                   {"robustness": table},
+                   {"variants": [varied for _, varied, _ in variants], "objects": [item.id for item in few],
+                    "forces_n": list(self.values.robustness.forces_n), "seed": self.values.seed,
+                    "statistics": self.values.statistics.model_dump(mode="json")})
 
     def figures(self) -> list[Job]:
         """The figures and the page."""

@@ -117,8 +117,13 @@ def draw_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
 
 
 def draw_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Draw what the hyperelastic model errs less than both elastic ones, in each truth.  inputs: robustness;  outputs: png, svg."""
-    table = read_csv(inputs["robustness"])
+    """Draw what the hyperelastic model errs less than both elastic ones in each truth: at all forces, with intervals, and at each.
+
+    inputs: robustness;  outputs: png, svg
+    """
+    everything = read_csv(inputs["robustness"])
+    single = [(force, rows) for force, rows in everything.groupby("force_n", sort=False) if force != "all"]
+    table = everything[everything.force_n == "all"]
     names = [f"{one.law.replace('_', ' ')}, K/mu {one.bulk_over_shear:g}, "
              f"tips {'bonded' if one.tips_bonded else 'free'}, {one.mesh}"
              for one in table.itertuples()]
@@ -129,7 +134,11 @@ def draw_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings
         for place, word in enumerate(table[f"verdict_over_{other}"]):
             axes.plot([low[place], high[place]], [place, place], "-", color=_SIGNS[word])
             axes.plot(gain[place], place, "o", ms=3, color=_SIGNS[word])
+        for (force, rows), marker in zip(single, itertools.cycle("<>^vsD"), strict=False):
+            axes.plot(rows[f"gain_over_{other}"], range(len(rows)), marker, ms=4, mfc="none", color="0.3", label=f"{force} N alone")
         axes.set_xlabel(f"error of {other} minus that of\nhyperelastic, over mean reading (1)", fontsize=8)
     figure.axes[0].set_yticks(range(len(names)), names, fontsize=7)
     figure.axes[0].invert_yaxis()
+    if single:
+        figure.axes[1].legend(fontsize=7)
     save(figure, outputs["png"], outputs["svg"])

@@ -60,7 +60,8 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
     inputs: variants (presses, the objects of one variant after those of the other), presses_elastic, presses_matched,
     presses_hyperelastic (lists, of the objects), sensor;  outputs: robustness (CSV)
-    settings: variants [{law, bulk_over_shear, tips_bonded, mesh}, ...], objects, seed, statistics
+    settings: variants [{law, bulk_over_shear, tips_bonded, mesh}, ...], objects, forces_n, seed, statistics
+    A row for all forces (force_n: all), whose one gain fits no linear layer to a sensor that stiffens, and one for each force.
     Read by the gap formula, whose one gain is fitted to the other objects, and of a single object to itself. With fewer objects
     than the statistics ask for every verdict is undecided: means and intervals then orient, they test nothing.
     """
@@ -69,11 +70,13 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     rows = []
     for number, varied in enumerate(settings["variants"]):
         truths = [read_dataset(path) for path in inputs["variants"][number * count:(number + 1) * count]]
-        errors = {model: _errors(spec, truths, presses) for model, presses in tested.items()}
-        row = varied | {"objects": count} | {f"error_{model}": float(np.nanmean(values)) for model, values in errors.items()}
-        for other in (ELASTIC, MATCHED):
-            row |= _nearer(errors[other] - errors[HYPERELASTIC], f"over_{other}", settings)
-        rows.append(row)
+        for force in ["all", *(settings["forces_n"] if len(settings["forces_n"]) > 1 else [])]:
+            errors = {model: _errors(spec, truths, presses, force) for model, presses in tested.items()}
+            row = varied | {"force_n": force, "objects": count}
+            row |= {f"error_{model}": float(np.nanmean(values)) for model, values in errors.items()}
+            for other in (ELASTIC, MATCHED):
+                row |= _nearer(errors[other] - errors[HYPERELASTIC], f"over_{other}", settings)
+            rows.append(row)
     write_csv(outputs["robustness"], pd.DataFrame(rows))
 
 
@@ -89,12 +92,12 @@ def _nearer(gain: np.ndarray, name: str, settings: Mapping[str, Any]) -> dict[st
     return {f"gain_{name}": found.mean, f"low_{name}": found.low, f"high_{name}": found.high, f"verdict_{name}": word}
 
 
-def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any]) -> np.ndarray:
-    """Errors over the readings (object,) of the gap formula; nan without a valid load step.
+def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any], force: float | str) -> np.ndarray:
+    """Errors over the readings (object,) of the gap formula at a force in N, or at all; nan without a valid load step.
 
     The gain is fitted to the other objects, or to the object itself where no other has a valid load step.
     """
-    pairs = [_counts(spec, truth, press) for truth, press in zip(truths, presses, strict=True)]
+    pairs = [_counts(spec, truth, press, force) for truth, press in zip(truths, presses, strict=True)]
     errors = np.full(len(pairs), np.nan)
     for k, (true, ideal) in enumerate(pairs):
         others = [pair for other, pair in enumerate(pairs) if other != k and len(pair[0])] or [(true, ideal)]
@@ -104,10 +107,11 @@ def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any]) -> np.ndarr
     return errors
 
 
-def _counts(spec: SensorSpec, truth: Any, press: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Ideal counts (n, row, column) of a truth and of a tested model at the forces of the truth at which both hold."""
+def _counts(spec: SensorSpec, truth: Any, press: Any, force: float | str) -> tuple[np.ndarray, np.ndarray]:
+    """Ideal counts (n, row, column) of a truth and of a tested model at those of the truth's forces at which both hold."""
     forces = press.normal_force_n.values
     places = [int(np.argmin(np.abs(forces - force))) for force in truth.normal_force_n.values]
     valid = (truth.within_validity.values == 1) & (press.within_validity.values[places] == 1)
+    valid &= np.isclose(truth.normal_force_n.values, force, rtol=1e-6) if force != "all" else True
     return (ideal_of(spec, truth.deformation_map_mm.values[valid]),
             ideal_of(spec, press.deformation_map_mm.values[places][valid]))

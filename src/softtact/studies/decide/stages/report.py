@@ -16,7 +16,8 @@ CAPTIONS = {
                 "elastic layers of all moduli, and the foundation model; circles: hyperelastic.",
     "learning_curve": "Error of the compact network trained on growing shares of the indenters, with as many steps for each.",
     "robustness": "What the hyperelastic model errs less than the elastic ones against truths of every combination; few objects, "
-                  "gap formula. Right of zero the hyperelastic model is nearer; grey: undecided.",
+                  "gap formula, one gain for all forces or for each alone. Right of zero the hyperelastic model is nearer; grey: "
+                  "undecided.",
 }
 _TITLES = {"power": "Power, stated before the scores", "robustness": "Map of robustness", "learning_curve": "Learning curves"}
 _MOST_ROWS = 60
