@@ -72,7 +72,7 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
         truths = [read_dataset(path) for path in inputs["variants"][number * count:(number + 1) * count]]
         for force in ["all", *(settings["forces_n"] if len(settings["forces_n"]) > 1 else [])]:
             errors = {model: _errors(spec, truths, presses, force) for model, presses in tested.items()}
-            row = varied | {"force_n": force, "objects": count}
+            row = varied | {"force_n": force if force == "all" else f"{force:g}", "objects": count}
             row |= {f"error_{model}": float(np.nanmean(values)) for model, values in errors.items()}
             for other in (ELASTIC, MATCHED):
                 row |= _nearer(errors[other] - errors[HYPERELASTIC], f"over_{other}", settings)
