@@ -16,7 +16,7 @@ from softtact.materials.config import law_from_printed
 from softtact.models.hyperelastic import newton, path
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.mesh_settings import MeshSettings, NewtonSettings
-from softtact.models.hyperelastic.newton_step import ContactStepper
+from softtact.models.hyperelastic.newton_step import ContactStepper, StepContact
 from softtact.press.sensor import Sensor
 from softtact.sensors.library import material_file
 
@@ -100,12 +100,15 @@ def test_a_run_under_rounded_edges_follows_points_in_two_steps_and_goes_on_while
     """Points slip around an edge one after the other: more steps that follow them are no descent, fewer iterations begin anew."""
     body, surface, followed, accepted = small_body(), HeightField(resting_ball()), [], newton._Press.accepted
     monkeypatch.setattr(newton._Press, "accepted", lambda self, *of: followed.append(self.projected) or accepted(self, *of))
+    corrected, correct = [], StepContact._correct
+    monkeypatch.setattr(StepContact, "_correct", lambda self, *of: corrected.append(self) or correct(self, *of))
     start = body.resisting_folding(newton.first_touch(body, surface, NewtonSettings.draft()), surface)
     followed.clear()
     hurried = replace(NewtonSettings.draft(), max_iterations=3, nearly_balanced=0.0)
     found = newton.settle(body, surface, start, 2.0, 0.002, hurried)
     assert found.state is not None and found.iterations > 3
     assert followed == [True, True, *[False] * (found.iterations - 2)]
+    assert 0 < len(corrected) <= found.iterations - 2      # of those that keep their normals; not the ones that are cut
     body.close()
 
 
