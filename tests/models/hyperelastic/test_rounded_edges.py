@@ -116,3 +116,23 @@ def test_a_step_that_is_cut_keeps_the_gaps_of_its_planes(body, wavy):
     state = slab.evaluate(np.zeros_like(wavy), slab.project(np.zeros_like(wavy), surface, 0.1), 0.1)
     contact = StepContact(slab, state, 0.1, surface, turning=False, largest_mm=0.1)
     assert not contact.follow(wavy.ravel()[slab.unknowns], 0.02)
+
+
+def test_the_way_along_a_corrected_step_begins_along_the_one_that_lowers_the_potential(body):
+    """What is corrected grows with the square of the way; with all of the correction, no share of some steps is an improvement."""
+    rounding(body)
+    tilted = trimesh.creation.box((1.0, 1.5, 4.0)).apply_translation([0.0, 0.0, 2.0])
+    tilted.apply_transform(trimesh.transformations.rotation_matrix(0.4, [1.0, 0.3, 0.0]))
+    surface = HeightField(tilted.apply_translation([0.0, 0.0, -tilted.bounds[0, 2]]))
+    (slab, support), depth, force = body.rest(), 0.06, 2.0
+    state = body.evaluate(slab, support, depth, body.slab.project(slab, surface, depth))
+    step = body.newton_step(state, force, surface, turning=False)
+    straight = step.straight()
+    assert np.abs(step.slab - straight.slab).max() > 0.1
+    for share in (1.0, 0.5, 1e-3):
+        for found, whole, first in zip(step.share(share), (step.slab, step.support, step.indentation),
+                                       (straight.slab, straight.support, straight.indentation), strict=True):
+            np.testing.assert_allclose(found, share * first + share**2 * (whole - first), atol=1e-12)
+    slab, support, lowered = step.share(1e-3)
+    moved = body.evaluate(slab, support, depth + lowered, body.slab.project(slab, surface, depth + lowered))
+    assert moved.energy - force * moved.indentation < state.energy - force * depth

@@ -8,6 +8,7 @@ would halve it for all. Each local step decreases the frustum's energy, and so t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -289,6 +290,13 @@ class LayeredBody:
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
         step, indentation_increment = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
                                                              largest_mm, damped_before=damped_before)
+        whole = self._step_of_body(step, indentation_increment, kept, contact)
+        if contact.straight is None:
+            return whole
+        return replace(whole, straight=cache(partial(self._step_of_body, *contact.straight, kept, contact)))
+
+    def _step_of_body(self, step, indentation_increment, kept, contact):
+        """The `BodyStep` of the unknowns' step (n,)."""
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, support = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)

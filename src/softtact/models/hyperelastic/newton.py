@@ -201,8 +201,9 @@ class _Press:
         return min(1.0, self.settings.largest_step_mm / max(step.largest(), 1e-30))
 
     def moved(self, state, step, share):
-        slab, indentation = state.slab.displacement + share * step.slab, state.indentation + share * step.indentation
-        trial = self.body.evaluate(slab, state.support.displacement + share * step.support, indentation,
+        slab, support, lowered = step.share(share)
+        slab, indentation = state.slab.displacement + slab, state.indentation + lowered
+        trial = self.body.evaluate(slab, state.support.displacement + support, indentation,
                                    self._projection_at(slab, indentation, step), state.history)
         return None if trial is None else self.body.balanced(trial, self.tolerance)
 

@@ -57,6 +57,7 @@ class StepContact:
         self._turning = turning
         self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
         self._largest_mm = largest_mm
+        self.straight: tuple[np.ndarray, float] | None = None      # the step that was corrected
         self._face(state.projection)
 
     def _face(self, projection):
@@ -112,7 +113,7 @@ class StepContact:
         change = self.points.rows @ step + self.points.indentation_increment * indentation_increment
         near = (projection.covered > 0) & (self.projection.covered > 0)
         self.points = replace(self.points, gaps=np.where(near, at_end - change, self.points.gaps))
-        self._surface = None
+        self._surface, self.straight = None, (step, indentation_increment)
 
     def _projected(self, step, indentation_increment):
         """The contact projection after a step."""

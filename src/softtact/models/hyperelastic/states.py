@@ -131,12 +131,29 @@ class BodyState:
 
 @dataclass(frozen=True)
 class BodyStep:
-    """A Newton step: slab (n, 3), support (f, nodes, 3) in mm, indentation in mm, and the contact projection that it assumes."""
+    """A Newton step: slab (n, 3), support (f, nodes, 3) in mm, indentation in mm, and the contact projection that it assumes.
+
+    straight: gives the same step before it was corrected for the object's curvature; None: it was not
+    """
 
     slab: np.ndarray
     support: np.ndarray
     indentation: float
     projection: ContactProjection
+    straight: "Callable[[], BodyStep] | None" = None
+
+    def share(self, share: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Movements of slab, support and object in a share of the step.
+
+        The correction grows with the square of the share, as what it corrects does: so the way begins along the step that lowers
+        the potential, which a corrected one need not do.
+        """
+        if self.straight is None or share == 1.0:
+            return share * self.slab, share * self.support, share * self.indentation
+        first = self.straight()
+        begun, turned = share * (1.0 - share), share**2
+        return (begun * first.slab + turned * self.slab, begun * first.support + turned * self.support,
+                begun * first.indentation + turned * self.indentation)
 
     def largest(self) -> float:
         return max(np.abs(self.slab).max(), np.abs(self.support).max(initial=0.0), abs(self.indentation))
