@@ -32,7 +32,7 @@ from softtact.press.crushing import crushing_forces_n
 from softtact.press.sensor import load_sensor
 from softtact.press.validity import BETWEEN
 
-SEED = {"trial": 1, "judged": 20261202}
+SEED = {"trial": 1, "judged": 20261204}
 FORCES_N = np.array([5.0, 10.0, 20.0])
 LARGEST_TILT = 45.0
 LIMIT_S, TOLD_S = 360.0, 60.0      # of the processor
