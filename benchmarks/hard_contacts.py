@@ -28,7 +28,7 @@ from softtact.errors import InputError, SofttactError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.models.hyperelastic.mesh_settings import MeshSettings, NewtonSettings
-from softtact.press.crushing import crushing_forces_n
+from softtact.press.foretelling import foretell
 from softtact.press.sensor import load_sensor
 from softtact.press.validity import BETWEEN
 
@@ -70,9 +70,10 @@ def outcome(sensor, mesh, pose):
     start = time.process_time()
     row = {"reached_n": 0.0, "least_volume_ratio": None, "why": ""}
     try:
-        may, _ = crushing_forces_n(sensor, place(mesh, pose=pose), FORCES_N[-1])
-        row["crushed_from_n"] = round(float(may), 2) if np.isfinite(may) else None
-        forces = np.unique(np.minimum(FORCES_N, may))
+        told = foretell(sensor, place(mesh, pose=pose), FORCES_N[-1])
+        row["crushed_from_n"] = round(told.may_crush_n, 2) if np.isfinite(told.may_crush_n) else None
+        row["grazed_frusta"] = told.grazed_frusta and round(told.grazed_frusta, 1)
+        forces = np.unique(np.minimum(FORCES_N, told.may_crush_n))
         signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
         result = sensor.press(mesh, pose=pose, force_n=forces, model="hyperelastic", threads=1, label="")
         row["outcome"] = "reached" if result.within_validity.all() else "crushed" if crushed_last(result) else "flagged"
@@ -92,8 +93,8 @@ def outcome(sensor, mesh, pose):
         row |= {"reached_n": round(float(result.normal_force_n[-1]), 2),
                 "least_volume_ratio": round(float(result.least_volume_ratio.min()), 3)}
     row["processor_s"] = round(time.process_time() - start, 1)
-    told = row["processor_s"] <= TOLD_S or row.get("crushed_from_n") is not None
-    row["told"] = row["outcome"] not in ("reached", "crushed") and told
+    foretold = any(row.get(name) is not None for name in ("crushed_from_n", "grazed_frusta"))
+    row["told"] = row["outcome"] not in ("reached", "crushed") and (foretold or row["processor_s"] <= TOLD_S)
     return row
 
 

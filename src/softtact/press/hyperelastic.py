@@ -14,7 +14,7 @@ from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.press.cache import in_words
-from softtact.press.crushing import warn_of_crushing
+from softtact.press.foretelling import warn_before
 from softtact.press.making import make_result
 from softtact.press.objects import shell_of
 from softtact.press.result import PressResult
@@ -41,7 +41,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
     if isinstance(forces, Motion):
         path.check_motion(forces)
     else:
-        warn_of_crushing(sensor, placed, float(forces[-1]))
+        warn_before(sensor, placed, float(forces[-1]))
     body = sensor.body(threads=control.threads, surface=_swept(surface, forces))
     if control.label:
         steps = f"{count} load step{'s' * (count > 1)}"

@@ -1,4 +1,4 @@
-"""Crushed frusta are foretold before a press by the hyperelastic model begins."""
+"""What is foretold before a press by the hyperelastic model begins: crushed frusta, and a touch of the border alone."""
 
 import warnings
 
@@ -9,14 +9,19 @@ from foundation_study import SMALL
 from support.bodies import COARSE
 from support.laws import LAWS
 
-from softtact.errors import CrushedWarning, TimeLimitError
-from softtact.press.crushing import crushing_forces_n
+from softtact.errors import CrushedWarning, ShellWarning, TimeLimitError
+from softtact.press.foretelling import foretell
 from softtact.press.sensor import Sensor
 
 
 @pytest.fixture
 def sensor(compliance):
     return Sensor(SMALL, LAWS, mesh=COARSE, prepared_models={"foundation": compliance})
+
+
+def crushing_forces_n(sensor, placed, largest_n):
+    told = foretell(sensor, placed, largest_n)
+    return told.may_crush_n, told.will_crush_n
 
 
 @pytest.fixture
@@ -58,3 +63,32 @@ def test_light_presses_and_sensors_without_the_foundation_model_are_not_warned_o
         monkeypatch.setattr("softtact.press.sensor.seconds_to_prepare_foundation", lambda spec, laws: 30.0)
     with warnings.catch_warnings(action="error"), pytest.raises(TimeLimitError):
         sensor.press(ball, pose=np.eye(4), force_n=[force_n], model="hyperelastic", label="", time_limit_s=0.0)
+
+
+def beside(sensor, within_mm):
+    """A block beside the pad, upright, which overlaps it by `within_mm`."""
+    block = trimesh.creation.box((4.0, 3.0, 4.0))
+    return block.apply_translation([0.5 * sensor.spec.footprint_mm[0] - within_mm + 2.0, 0.0, 2.0])
+
+
+def test_an_object_on_the_shell_that_touches_the_border_alone_is_told_with_the_number_of_frusta_it_moves(sensor):
+    block = beside(sensor, 0.2)
+    told = foretell(sensor, block, 10.0)
+    result = sensor.press(block, pose=np.eye(4), force_n=10.0, model="foundation", label="")
+    node = np.diff(sensor.spec.map_x_mm)[0] * np.diff(sensor.spec.map_y_mm)[0]
+    moved = (result.deformation_map_mm[0] >= 0.1 * sensor.spec.frustum_height_mm).sum() * node
+    pitch = np.divide(sensor.spec.footprint_mm, sensor.spec.frusta_counts)
+    assert result.shell_force_n[0] > 0 and 0 < told.grazed_frusta < 6
+    assert told.grazed_frusta == pytest.approx(moved / pitch.prod(), rel=1e-12)
+    assert told.may_crush_n == told.will_crush_n == np.inf
+
+
+def test_an_object_on_the_shell_that_presses_many_frusta_or_one_that_the_pad_carries_does_not_graze(sensor, ball):
+    assert foretell(sensor, beside(sensor, 3.0), 20.0).grazed_frusta is None
+    assert foretell(sensor, ball, 0.2).grazed_frusta is None
+
+
+def test_a_press_of_the_border_alone_is_told_before_its_first_load_step(sensor):
+    told = r"rest on the shell and presses the sensor at its border only, on about \d frusta"
+    with pytest.warns(ShellWarning, match=told), pytest.raises(TimeLimitError):
+        sensor.press(beside(sensor, 0.2), pose=np.eye(4), force_n=10.0, model="hyperelastic", label="", time_limit_s=0.0)
