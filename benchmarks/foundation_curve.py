@@ -147,7 +147,7 @@ def draw(rows):
         axis.set_xticks(sorted(set(rows.maps)), [f"{size:,}" for size in sorted(set(rows.maps))])
         axis.minorticks_off()
     axes[0].set_ylabel("error over mean reading, objects never seen")
-    axes[0].legend(frameon=False)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, frameon=False)
     return figure
 
 
