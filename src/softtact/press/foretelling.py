@@ -81,7 +81,7 @@ def _grazed(spec, found):
     node = np.diff(spec.map_x_mm)[0] * np.diff(spec.map_y_mm)[0]
     cell = np.prod(spec.footprint_mm) / np.prod(spec.frusta_counts)
     frusta = float((found.deformation_map_mm[-1] >= _MOVED * spec.frustum_height_mm).sum() * node / cell)
-    return frusta if frusta < _FEW_FRUSTA else None
+    return frusta if 0.0 < frusta < _FEW_FRUSTA else None      # the shell alone carries an object that moves none
 
 
 def warn_before(sensor: "Sensor", placed: Trimesh, largest_n: float) -> None:

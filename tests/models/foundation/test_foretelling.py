@@ -88,6 +88,11 @@ def test_an_object_on_the_shell_that_presses_many_frusta_or_one_that_the_pad_car
     assert foretell(sensor, ball, 0.2).grazed_frusta is None
 
 
+def test_an_object_that_the_shell_alone_carries_does_not_graze(sensor):
+    roof = trimesh.creation.box((4.0, 4.0, 1.0)).apply_translation([0.0, 0.0, 3.5])
+    assert foretell(sensor, trimesh.util.concatenate([beside(sensor, -0.6), roof]), 10.0).grazed_frusta is None
+
+
 def test_a_press_of_the_border_alone_is_told_before_its_first_load_step(sensor):
     told = r"rest on the shell and presses the sensor at its border only, on about \d frusta"
     with pytest.warns(ShellWarning, match=told), pytest.raises(TimeLimitError):
