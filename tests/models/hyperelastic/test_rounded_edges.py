@@ -10,6 +10,8 @@ from support.bodies import small_body
 from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import HeightField, MovedSurface
 from softtact.contact.rounded_object import REACH_MM
+from softtact.models.hyperelastic.mesh_settings import NewtonSettings
+from softtact.models.hyperelastic.newton import _PressOfRounded
 from softtact.models.hyperelastic.newton_step import StepContact
 from softtact.models.hyperelastic.rigid_contact import ROWS
 
@@ -133,6 +135,6 @@ def test_the_way_along_a_corrected_step_begins_along_the_one_that_lowers_the_pot
         for found, whole, first in zip(step.share(share), (step.slab, step.support, step.indentation),
                                        (straight.slab, straight.support, straight.indentation), strict=True):
             np.testing.assert_allclose(found, share * first + share**2 * (whole - first), atol=1e-12)
-    slab, support, lowered = step.share(1e-3)
-    moved = body.evaluate(slab, support, depth + lowered, body.slab.project(slab, surface, depth + lowered))
+    moved = _PressOfRounded(body, surface, force, np.inf, NewtonSettings()).moved(state, step, 1e-3)
+    np.testing.assert_array_equal(moved.slab.displacement, step.share(1e-3)[0])
     assert moved.energy - force * moved.indentation < state.energy - force * depth
