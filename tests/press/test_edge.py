@@ -50,6 +50,15 @@ def test_a_plate_wider_than_a_pad_whose_shell_is_flush_presses_the_shell_alone(m
     assert np.isnan(result.torque_nmm).all()
 
 
+def test_an_object_on_the_shell_that_no_point_of_the_pad_beside_it_carries_is_flagged():
+    """Its border overlaps the pad's by 0.01 mm, less than the outermost points are inside; 0.05 mm deep it must press the pad."""
+    beside = (15.0 + 0.5 * SMALL.footprint_mm[0] - 0.01, 0.0, 1.0, 0.0, 0.0, 0.0)
+    with pytest.warns(ShellWarning, match="which carries 0 N of it"):
+        result = with_edge(SidesBelow(sides_below_mm=0.05)).press(PLATE, pose=beside, force_n=1.0, model="hyperelastic", label="")
+    assert result.pad_force_n[0] <= 0 and result.within_validity.tolist() == [0]
+    assert "fewer than 9 points of the cover" in result.validity_reason[0]
+
+
 @pytest.mark.parametrize("model", ["elastic", pytest.param("hyperelastic", marks=pytest.mark.slow)])
 def test_a_plate_sinks_until_it_rests_and_the_shell_carries_what_is_added(model):
     sensor = with_edge(SidesBelow(sides_below_mm=0.05))

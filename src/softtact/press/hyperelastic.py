@@ -47,7 +47,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
         steps = f"{count} load step{'s' * (count > 1)}"
         announce(f"{control.label}: {sensor.spec.parts_in_words}, {steps} of the hyperelastic model{time_in_words(sensor, count)}")
     body.watch = Watch(control.label, limit_s=control.time_limit_s)
-    record = _Record(sensor, body, touch, control)
+    record = _Record(sensor, body, surface, touch, control)
     load_steps = map(record.take, _allowed(_load_steps(sensor, body, surface, forces, touch), sensor, surface, forces, touch))
     try:
         control.reached.follow(load_steps, count, record.result)
@@ -102,8 +102,8 @@ def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
 class _Record:
     """The numbers of a press' load steps, and the bodies if they are kept."""
 
-    def __init__(self, sensor, body, touch_mm, control):
-        self._sensor, self._body, self._touch_mm, self._control = sensor, body, touch_mm, control
+    def __init__(self, sensor, body, surface, touch_mm, control):
+        self._sensor, self._body, self._surface, self._touch_mm, self._control = sensor, body, surface, touch_mm, control
         self._grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
         self._sampling = body.slab.sampling(self._grid)
         self._lower = None if sensor.spec.base_held else lower_side(body.slab, self._grid)
@@ -113,9 +113,18 @@ class _Record:
     def take(self, load_step):
         """Record the numbers of a load step; its time is recorded by the caller."""
         maps = self._sampling, self._lower, self._grid
-        self._steps.append(_read_load_step(self._body, maps, load_step, from_mm=self._touch_mm))
+        numbers = _read_load_step(self._body, maps, load_step, from_mm=self._touch_mm)
+        if numbers["pad_force_n"] <= 0 and not self._reaches(load_step.state):
+            numbers["points"] = np.inf      # there is nothing to carry
+        self._steps.append(numbers)
         if self._control.keep_body:
             self._bodies.append(pressed_body(self._body, load_step.state))
+
+    def _reaches(self, state):
+        """Whether the object reaches below the free surface of the pad, which must carry it then."""
+        spec, offset = self._sensor.spec, state.slab.projection.offset_mm
+        low, high = (np.array([spec.map_x_mm[end], spec.map_y_mm[end]]) - offset for end in (0, -1))
+        return state.indentation - self._surface.lowest_over(low, high) > self._sensor.solver.largest_penetration_mm
 
     def result(self):
         """The `PressResult` of the load steps whose time is recorded: an interruption may come just before that."""
@@ -127,10 +136,9 @@ class _Record:
         numbers["displacement_mm"] = displacement.reshape(len(steps), *sensor.spec.map_shape, 3)
         numbers["slip"] = numbers["slip"].reshape(len(steps), *sensor.spec.map_shape)
         _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
-        points = np.where(numbers["pad_force_n"] > 0, numbers.pop("points"), np.inf)
         flags = flags_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
-                                   contact_error_mm=numbers.pop("contact_error_mm"), points=points, rough=numbers.pop("rough"),
-                                   volume_ratio=numbers["least_volume_ratio"],
+                                   contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
+                                   rough=numbers.pop("rough"), volume_ratio=numbers["least_volume_ratio"],
                                    frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                    allowed_mm=sensor.solver.largest_penetration_mm)
         made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(times),
