@@ -88,8 +88,8 @@ def warn_of_shell(spec: "AnySpec", forces: np.ndarray, on_pad: np.ndarray) -> No
     if len(resting):
         first = resting[0]
         warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which carries "
-                      f"{max(on_pad[first], 0.0):.3g} N of it (`result.pad_force_n`; {spec.edge.in_words}); if your sensor's shell ends lower, state 'edge' in "
-                      "its file.", ShellWarning, stacklevel=5)
+                      f"{max(on_pad[first], 0.0):.3g} N of it (`result.pad_force_n`; {spec.edge.in_words}); if your sensor's "
+                      "shell ends lower, state 'edge' in its file.", ShellWarning, stacklevel=5)
 
 
 def _friction(spec, model):

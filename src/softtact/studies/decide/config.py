@@ -24,6 +24,7 @@ ELASTIC, ELECTRODES, MATCHED, FOUNDATION, HYPERELASTIC = MODELS = (
     "elastic", "electrodes", "matched", "foundation", "hyperelastic")
 CONTROLS = {"ceiling": HYPERELASTIC, "flipped": MATCHED}     # truths that are tested models
 INDENTERS = "indenters"
+COMPACT, PRINTED = "compact", "printed"      # networks
 
 
 class Pressing(Section):
@@ -76,7 +77,7 @@ class Learning(Section):
     validation_share: Fraction = Field(description="of the indenters, whole objects: they choose the best epoch")
     truths: Annotated[list[Name], Field(min_length=1)] = Field(description="whose readings networks are trained on")
     compact: Trainings
-    printed: Trainings | None = Field(None, description="the paper's network; null: none, for one takes hours on a CPU")
+    printed: Trainings | None = Field(None, description="the paper's network; null: none")
     curve: list[Share] = Field(description="shares of the training indenters at which the compact network is trained anew")
     device: Literal["auto", "cpu", "cuda"] = "auto"
 

@@ -5,7 +5,7 @@
     matched.json                           the modulus of the matched elastic model
     presses/MODEL/ITEM.nc                  of tested models, truths, and truths of the map of robustness (few items)
     readings/TRUTH.nc                      the virtual sensor's counts of all items
-    learning/TRUTH/MODEL.csv, ..._curve.csv      scores of networks, seed by seed, and of growing shares of the indenters
+    learning/TRUTH/MODEL_compact.csv, ..._printed_SEED.csv, ..._curve.csv      scores of networks, and on growing shares of indenters
     tables/power.csv                       stated before any score is known
     tables/scores.csv, hypotheses.csv, learning_curve.csv, robustness.csv, collapse.csv, claims.csv
     figures/, report.html
@@ -21,7 +21,7 @@ import numpy as np
 
 from softtact.sensors.library import material_file
 from softtact.studies.configuration import found_sensor
-from softtact.studies.decide.config import HYPERELASTIC, MATCHED, MODELS, DecideItem, DecideStudy, Pressing
+from softtact.studies.decide.config import COMPACT, HYPERELASTIC, MATCHED, MODELS, PRINTED, DecideItem, DecideStudy, Pressing
 from softtact.studies.jobs import Job, figure_files, from_here
 
 TABLES = ("scores", "hypotheses", "learning_curve", "power", "robustness", "collapse")
@@ -130,18 +130,28 @@ class _Jobs:
         return {"readings": f"{self.folder}/readings/{truth}.nc", "maps": f"{self.folder}/maps.nc", **self.sensor}
 
     def learning(self) -> list[Job]:
-        """The trainings of networks: all seeds of one model and truth, and its learning curve."""
-        settings = {"learning": self.values.learning.model_dump(mode="json"), "seed": self.values.seed,
-                    "ssim_window": self.values.ssim_window}
-        steps = len(self.study.indenters) * len(self.forces)
-        compact = self.values.learning.compact
-        maps = steps * compact.epochs * (compact.seeds + len(self.values.learning.curve))
-        printed = self.values.learning.printed
-        work = {"compact_maps": maps} | ({"printed_maps": steps * printed.epochs * printed.seeds} if printed else {})
-        return [Job("learn", self.maps(truth), {"scores": f"{self.folder}/learning/{{truth}}/{{model}}.csv",
-                                                "curve": f"{self.folder}/learning/{{truth}}/{{model}}_curve.csv"},
-                    settings | {"truth": truth, "model": model}, {"truth": truth, "model": model}, work)
-                for truth in self.values.learning.truths for model in MODELS]
+        """The trainings of networks on one model's maps and one truth's readings, and the compact network's learning curve."""
+        plan = self.values.learning
+        trainings = [(COMPACT, plan.compact, list(range(plan.compact.seeds)))]
+        if plan.printed is not None:      # a training takes minutes: each is a job of its own
+            trainings += [(PRINTED, plan.printed, [seed]) for seed in range(plan.printed.seeds)]
+        made = {"scores": f"{self.folder}/learning/{{truth}}/{{model}}_{{network}}.csv"}
+        learned = [self._trained("learn", truth, model, made, architecture, trained, {"seeds": seeds}, len(seeds), {
+            "network": architecture if architecture == COMPACT else f"{architecture}_{seeds[0]}"})
+            for truth in plan.truths for model in MODELS for architecture, trained, seeds in trainings]
+        curve = {"curve": f"{self.folder}/learning/{{truth}}/{{model}}_curve.csv"}
+        return [*learned, *(self._trained("trace_curve", truth, model, curve, COMPACT, plan.compact, {"shares": plan.curve},
+                                          len(plan.curve), {}) for truth in plan.truths for model in MODELS)]
+
+    def _trained(self, stage, truth, model, made, architecture, trained, settings, times, wildcards):
+        """A job that trains an architecture some times."""
+        plan = self.values.learning
+        common = {"truth": truth, "model": model, "architecture": architecture, "seed": self.values.seed, "device": plan.device,
+                  "validation_share": plan.validation_share, "ssim_window": self.values.ssim_window,
+                  "trained": trained.model_dump(mode="json", exclude={"seeds"})}
+        maps = len(self.study.indenters) * len(self.forces) * trained.epochs * times
+        return Job(stage, self.maps(truth), made, common | settings, {"truth": truth, "model": model, **wildcards},
+                   {f"{architecture}_maps": maps})
 
     def judging(self) -> list[Job]:
         """Scores, power, hypotheses, and the maps of robustness and collapse."""
@@ -149,15 +159,16 @@ class _Jobs:
         statistics = values.statistics.model_dump(mode="json")
         common = {"seed": values.seed, "ssim_window": values.ssim_window}
         table = {name: f"{folder}/tables/{name}.csv" for name in (*TABLES, "claims")}
-        networks = [f"{folder}/learning/{truth}/{model}" for truth in values.learning.truths for model in MODELS]
+        learned = self.learning()
         scored = [Job("score_formulas", self.maps(truth), {"scores": f"{folder}/scores/{{truth}}.csv"}, common | {"truth": truth},
                       {"truth": truth}) for truth in self.study.truths]
         power = Job("state_power", {}, {"power": table["power"]},
                     {"statistics": statistics, **values.objects.model_dump(include={"smooth", "stepped"}),
                      "seeds": values.learning.compact.seeds, "tests": self._tests()})
         gathered = Job("gather_scores", {"formulas": [str(job.made()["scores"]) for job in scored],
-                                         "networks": [f"{name}.csv" for name in networks],
-                                         "curves": [f"{name}_curve.csv" for name in networks], "facts": self.facts(),
+                                         "networks": [str(job.made()["scores"]) for job in learned if job.stage == "learn"],
+                                         "curves": [str(job.made()["curve"]) for job in learned if job.stage == "trace_curve"],
+                                         "facts": self.facts(),
                                          **{f"presses_{model}": self.presses(model, self.study.objects) for model in MODELS},
                                          **self.sensor},
                        {name: table[name] for name in ("scores", "learning_curve")} | {"choices": f"{folder}/scores/choices.csv"},

@@ -16,9 +16,9 @@ from softtact.learning.dataset import Samples
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.ssim import map_ssim, own_range_ssim, whole_map_ssim
 from softtact.sensors.frusta import SensorSpec
-from softtact.studies.decide.config import INDENTERS, MODELS
+from softtact.studies.decide.config import COMPACT, INDENTERS, MODELS, PRINTED
 
-GAP, QUADRATIC, COMPACT, PRINTED = READOUTS = ("gap", "quadratic", "compact", "printed")
+GAP, QUADRATIC, *_ = READOUTS = ("gap", "quadratic", COMPACT, PRINTED)
 MEAN_READING, NO_READOUT = "mean_reading", "none"     # the contestant that reads no map: the trivial baseline of every readout
 SCORES = ["error_share", "ssim_own_range", "ssim_paper", "ssim_paper_whole"]
 COLUMNS = ["truth", "model", "readout", "seed", "object", "kind", "maps", *SCORES]

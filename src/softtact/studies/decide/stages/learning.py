@@ -11,10 +11,8 @@ from softtact.files import write_csv
 from softtact.studies.decide.config import MODELS
 from softtact.studies.decide.scoring import (
     COLUMNS,
-    COMPACT,
     MEAN_READING,
     NO_READOUT,
-    PRINTED,
     Case,
     formula_predictions,
     mean_reading,
@@ -44,63 +42,57 @@ def score_formulas(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
 
 def learn(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Train networks on one model's maps of the indenters from several seeds, and score them on the objects.
+    """Train a network on one model's maps of the indenters from several seeds, and score it on the objects.
 
-    inputs: as of `score_formulas`;  outputs: scores, curve (CSV: CURVE_COLUMNS, the compact network on growing shares)
-    settings: truth, model, learning (values of `config.Learning`), seed, ssim_window
+    inputs: as of `score_formulas`;  outputs: scores (CSV)
+    settings: truth, model, architecture, trained (values of `config.Trainings` without seeds), seeds, validation_share, device,
+        seed, ssim_window
     """
-    from softtact.learning.training import prepare_torch
+    work = _Work(read_case(inputs), settings, threads)
+    write_csv(outputs["scores"], pd.concat([work.trained(work.training, seed)[0] for seed in settings["seeds"]])[COLUMNS])
 
-    learning, case = settings["learning"], read_case(inputs)
-    device = prepare_torch(threads=threads, device=learning["device"])
-    work = _Work(case, settings, device)
-    write_csv(outputs["scores"], pd.concat(list(work.scores()))[COLUMNS])
+
+def trace_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Train a network on growing shares of the indenters.
+
+    inputs: as of `score_formulas`;  outputs: curve (CSV: CURVE_COLUMNS)
+    settings: as of `learn`, with shares in place of seeds
+    """
+    work = _Work(read_case(inputs), settings, threads)
     write_csv(outputs["curve"], pd.DataFrame(list(work.curve()), columns=CURVE_COLUMNS))
 
 
 class _Work:
-    """The trainings of one model and truth."""
+    """The trainings of one model, truth and architecture."""
 
-    def __init__(self, case: Case, settings: dict[str, Any], device: Any) -> None:
-        self._case, self._settings, self._device = case, settings, device
-        self._learning, self._model = settings["learning"], settings["model"]
+    def __init__(self, case: Case, settings: dict[str, Any], threads: int) -> None:
+        from softtact.learning.training import prepare_torch
+
+        self._case, self._settings, self._model = case, settings, settings["model"]
+        self._device = prepare_torch(threads=threads, device=settings["device"])
         order = np.random.default_rng(settings["seed"]).permutation(case.indenters)
-        kept = min(max(1, round(self._learning["validation_share"] * len(order))), len(order) - 1)
+        kept = min(max(1, round(settings["validation_share"] * len(order))), len(order) - 1)
         self._validation = case.samples(self._model, list(order[:kept]), "validation")
-        self._training = list(order[kept:])
+        self.training = list(order[kept:])
         self._test = case.samples(self._model, case.objects, "test")
-        self._done: dict[tuple[Any, ...], tuple[pd.DataFrame, dict[str, Any]]] = {}
-
-    def scores(self) -> Iterator[pd.DataFrame]:
-        """Scores of each seed."""
-        for architecture in (COMPACT, PRINTED):
-            plan = self._learning[architecture]
-            for seed in range(plan["seeds"] if plan else 0):
-                yield self._trained(architecture, self._training, seed)[0]
 
     def curve(self) -> Iterator[dict[str, Any]]:
         """A row for each share of the training indenters, first ones of one order."""
-        for share in self._learning["curve"]:
-            chosen = self._training[:max(1, round(share * len(self._training)))]
-            scores, facts = self._trained(COMPACT, chosen, 0)
+        for share in self._settings["shares"]:
+            chosen = self.training[:max(1, round(share * len(self.training)))]
+            scores, facts = self.trained(chosen, 0)
             yield {"truth": self._settings["truth"], "model": self._model, "share": share, "indenters": len(chosen), **facts,
                    "error_share": scores.error_share.mean(), "ssim_own_range": scores.ssim_own_range.mean()}
 
-    def _trained(self, architecture: str, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
-        """`_train`, once: the end of the curve is the first seed's training."""
-        key = architecture, tuple(chosen), seed
-        if key not in self._done:
-            self._done[key] = self._train(architecture, chosen, seed)
-        return self._done[key]
-
-    def _train(self, architecture: str, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
+    def trained(self, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
         """Scores of the best network of one training on some indenters, and what is known of the training."""
         from softtact.learning.network import predict
         from softtact.learning.settings import Training
         from softtact.learning.training import start_run, train_network
 
-        plan, train = self._learning[architecture], self._case.samples(self._model, chosen, "train")
-        whole = max(1, math.ceil(len(self._training) * len(self._case.forces_n) / plan["batch"]))
+        architecture, plan = self._settings["architecture"], self._settings["trained"]
+        train = self._case.samples(self._model, chosen, "train")
+        whole = max(1, math.ceil(len(self.training) * len(self._case.forces_n) / plan["batch"]))
         steps = max(1, math.ceil(len(train) / plan["batch"]))
         epochs = max(1, round(plan["epochs"] * whole / steps))     # as many steps for a share
         options = Training(epochs=epochs, batch=plan["batch"], patience=epochs, learning_rate=plan["learning_rate"])
