@@ -5,7 +5,7 @@
     matched.json                           the modulus of the matched elastic model
     presses/MODEL/ITEM.nc                  of tested models, truths, and truths of the map of robustness (few items)
     readings/TRUTH.nc                      the virtual sensor's counts of all items
-    learning/TRUTH/MODEL_compact.csv, ..._printed_SEED.csv, ..._curve.csv      scores of networks, and on growing shares of indenters
+    learning/TRUTH/MODEL_compact.csv, _printed_SEED.csv, _curve.csv      scores of networks, and on growing shares of indenters
     tables/power.csv                       stated before any score is known
     tables/scores.csv, hypotheses.csv, learning_curve.csv, robustness.csv, collapse.csv, claims.csv
     figures/, report.html
