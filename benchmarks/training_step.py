@@ -1,21 +1,24 @@
 """A training step of each network beside the least time that arithmetic and memory allow: `python benchmarks/training_step.py`.
 
-One thread, processor time, a step of 32 maps; half a minute. Floor of the printed network: multiplications and additions of the
-forward pass, three times (values, gradients of values and of weights), at the rate of a large matrix product here, and the traffic
-of Adam's four arrays (weights and two moments read and written, gradients read: 28 bytes a weight) at that of a large sum here.
-Writes benchmarks/results/training_step.json.
+One thread, processor time, steps of 16 and of 32 maps, peak memory so far; half a minute. Floor of the printed network:
+multiplications and additions of the forward pass, three times (values, gradients of values and of weights), at the rate of a large
+matrix product here, and the traffic of Adam's four arrays (weights and two moments read and written, gradients read: 28 bytes a
+weight) at that of a large sum here. Writes benchmarks/results/training_step.json.
 """
 
+import resource
 import statistics
 import time
+from functools import partial
 
 import numpy as np
 import record
 import torch
 
 from softtact.learning.network import ARCHITECTURES, predict, summed_l1
+from softtact.learning.training import prepare_torch
 
-MAP, TAXELS, BATCH, STEPS = (57, 33), (7, 4), 32, 6
+MAP, TAXELS, BATCHES, STEPS = (57, 33), (7, 4), (16, 32), 6
 BYTES_OF_A_WEIGHT = 28
 
 
@@ -31,19 +34,20 @@ def processor_s(work, repeats):
 
 
 def costs(name, maps, counts):
-    """Processor time per map in a training step, and read alone."""
+    """Processor time per map in training steps, and read alone; peak memory of this process."""
     network = ARCHITECTURES[name](map_shape=MAP, taxels=TAXELS)
     optimiser = torch.optim.Adam(network.parameters(), lr=1e-4, fused=True)
 
-    def step():
-        optimiser.zero_grad()
-        summed_l1(network(torch.from_numpy(maps[:BATCH])), torch.from_numpy(counts)).backward()
+    def step(batch):
+        summed_l1(network(torch.from_numpy(maps[:batch])), torch.from_numpy(counts[:batch])).backward()
         optimiser.step()
+        optimiser.zero_grad()
 
-    train = processor_s(step, STEPS) / BATCH
+    train = {batch: processor_s(partial(step, batch), STEPS) / batch for batch in BATCHES}
     network.eval()
     return {"network": name, "train_map_s": train, "predict_map_s": processor_s(lambda: predict(network, maps), 3) / len(maps),
-            "weights": sum(weights.numel() for weights in network.parameters()), "flop_of_a_map": flop(network)}
+            "weights": sum(weights.numel() for weights in network.parameters()), "flop_of_a_map": flop(network),
+            "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)}
 
 
 def flop(network):
@@ -72,17 +76,19 @@ def machine():
 
 def main():
     """Measure, print and write the record."""
-    torch.set_num_threads(1)
+    prepare_torch(threads=1)
     torch.manual_seed(0)
     rng = np.random.default_rng(0)
     maps = rng.random((256, *MAP)).astype(np.float32)
-    counts = 1000 * rng.random((BATCH, *TAXELS)).astype(np.float32)
+    counts = 1000 * rng.random((max(BATCHES), *TAXELS)).astype(np.float32)
     rates, rows = machine(), []
     for name in ARCHITECTURES:
         row = costs(name, maps, counts)
-        arithmetic, traffic = 3e-9 * row["flop_of_a_map"], 1e-9 * BYTES_OF_A_WEIGHT * row["weights"] / BATCH
-        row["floor_map_s"] = arithmetic / rates["gflop_s"] + traffic / rates["gb_s"]
-        rows.append(row | {"over_floor": row["train_map_s"] / row["floor_map_s"]})
+        arithmetic = 3e-9 * row["flop_of_a_map"] / rates["gflop_s"]
+        traffic = 1e-9 * BYTES_OF_A_WEIGHT * row["weights"] / rates["gb_s"]
+        floor = {batch: arithmetic + traffic / batch for batch in BATCHES}
+        over = {batch: row["train_map_s"][batch] / floor[batch] for batch in BATCHES}
+        rows.append(row | {"floor_map_s": floor, "over_floor": over})
         print(rows[-1])
     record.write("training_step", rates=rates, torch=torch.__version__, rows=rows)
 
