@@ -1,4 +1,4 @@
-"""Keep the presses of a study that takes longer than one sitting in files small enough to be committed, and put them back.
+"""Keep presses and trainings of a study that takes longer than one sitting in files small enough to commit, and put them back.
 
     python scripts/keep_presses.py keep config/decide.yaml
     python scripts/keep_presses.py restore config/decide.yaml
@@ -6,7 +6,8 @@
 `keep` writes results/STUDY/presses/MODEL/ITEM.nc of the hyperelastic models, as far as they are there, to
 benchmarks/results/presses/STUDY/MODEL/ITEM.npz: 14 kB in place of 1 MB. Maps are rounded to 0.1 um; fields that no later stage
 reads are left out. `restore` writes those that are missing back, if the study's settings are still those of their presses. The
-objects have to be drawn before, else the workflow takes them for newer. Snakemake then makes the rest.
+objects have to be drawn before, else the workflow takes them for newer. Snakemake then makes the rest. Scores of trained networks
+are kept in benchmarks/results/presses/STUDY/learning.csv, and put back once the readings are there from which networks learn.
 """
 
 import argparse
@@ -17,14 +18,16 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray
 
 from softtact.errors import InputError
-from softtact.files import PROVENANCE, atomic_path, digest, read_arrays, read_dataset, read_yaml, write_dataset
+from softtact.files import PROVENANCE, atomic_path, digest, read_arrays, read_csv, read_dataset, read_yaml, write_csv, write_dataset
 from softtact.studies.registry import checked_study
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORD = ROOT / "benchmarks" / "results" / "presses"
+LEARNING = "learning.csv"
 MAP, STEP_MM = "deformation_map_mm", 1e-4
 
 
@@ -100,6 +103,46 @@ def restore(jobs: list, study: str) -> tuple[int, int]:
     return count, other
 
 
+def keep_trainings(jobs: list, study: str) -> int:
+    """Write the scores of the trainings that are done, beside those that were kept before; how many."""
+    kept = _kept_scores(study)
+    for path, name, settings in _trainings(jobs):
+        if path.exists():
+            kept[name] = read_csv(path).assign(training=name, settings=digest(settings))
+    if kept:
+        write_csv(RECORD / study / LEARNING, pd.concat(kept.values()))
+    return len(kept)
+
+
+def restore_trainings(jobs: list, study: str) -> tuple[int, int]:
+    """Write the scores that are missing and were kept; how many, and how many have to wait for their readings or changed."""
+    count = left = 0
+    kept = _kept_scores(study)
+    needed = [Path(path) for job in jobs if job.stage == "learn" for path in (job.inputs["readings"], job.inputs["maps"])]
+    for path, name, settings in _trainings(jobs):
+        if path.exists() or name not in kept:
+            continue
+        if not all(one.exists() for one in needed) or set(kept[name].settings) != {digest(settings)}:
+            left += 1
+            continue
+        write_csv(path, kept[name].drop(columns=["training", "settings"]))
+        count += 1
+    return count, left
+
+
+def _kept_scores(study):
+    """{training: its rows} of the record."""
+    record = RECORD / study / LEARNING
+    return dict(iter(read_csv(record).groupby("training", sort=False))) if record.exists() else {}
+
+
+def _trainings(jobs):
+    """(scores, name, settings) of the jobs that train a network."""
+    for job in jobs:
+        if job.stage == "learn":
+            yield Path(str(job.made()["scores"])), "/".join(job.wildcards.values()), job.settings
+
+
 def commits(study: str) -> Counter[str]:
     """{commit: presses that were kept at it}; empty for a study without records."""
     return Counter(str(_read(record).attrs["commit"]) for record in sorted((RECORD / study).glob("*/*.npz")))
@@ -133,10 +176,14 @@ def main() -> None:
         opened = checked_study(read_yaml(options.configuration, missing="there is no such configuration."), options.configuration)
         jobs, name = opened.jobs(f"results/{opened.study.name}"), opened.study.name
         if options.what == "keep":
-            print(f"{keep(jobs, name)} presses kept in {(RECORD / name).relative_to(ROOT)}")
+            print(f"{keep(jobs, name)} presses and {keep_trainings(jobs, name)} trainings kept in "
+                  f"{(RECORD / name).relative_to(ROOT)}")
         else:
             count, other = restore(jobs, name)
-            print(f"{count} presses restored to results/{name}/presses; {other} records are of other settings and were left")
+            trained, left = restore_trainings(jobs, name)
+            print(f"{count} presses restored to results/{name}/presses; {other} records are of other settings and were left. "
+                  f"{trained} trainings restored; {left} are of other settings, or wait for the readings and maps of the presses "
+                  "(snakemake --until read_truth gather_maps, then restore again).")
     except InputError as error:
         sys.exit(f"keep_presses: {error}")
 

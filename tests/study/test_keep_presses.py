@@ -1,4 +1,4 @@
-"""Presses of a long study, kept in small files and put back: what later stages read is the same."""
+"""Presses and trainings of a long study, kept in small files and put back: what later stages read is the same."""
 
 import importlib.util
 from pathlib import Path
@@ -86,3 +86,31 @@ def test_presses_are_put_back_after_the_objects_are_drawn(script, tmp_path):
     """Else Snakemake draws them later, takes the presses for older, and makes them again."""
     with pytest.raises(InputError, match=r"ball.stl is missing, .* draw the study's objects before"):
         script.restore(jobs(tmp_path), "study")
+
+
+def trainings(folder, **settings):
+    """Two trainings from the same readings."""
+    return [Job("learn", {"readings": f"{folder}/readings.nc", "maps": f"{folder}/maps.nc"},
+                {"scores": f"{folder}/{{truth}}/{{model}}_{{network}}.csv"}, {"seeds": [seed], **settings},
+                {"truth": "a", "model": "elastic", "network": f"printed_{seed}"}) for seed in range(2)]
+
+
+def scored(job):
+    """The scores of a training and their file."""
+    path = Path(job.made()["scores"])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("truth,seed,error_share\na,1,0.161524\na,1,1e-07\n")
+    return path
+
+
+def test_trainings_come_back_once_their_readings_are_there_and_unchanged(script, tmp_path):
+    made = trainings(tmp_path)
+    path = scored(made[1])
+    assert script.keep_trainings(made, "study") == 1
+    before = path.read_text()
+    path.unlink()
+    assert script.keep_trainings(made, "study") == 1 and script.restore_trainings(made, "study") == (0, 1) and not path.exists()
+    for name in ("readings.nc", "maps.nc"):
+        (tmp_path / name).touch()
+    assert script.restore_trainings(trainings(tmp_path, batch=8), "study") == (0, 1)
+    assert script.restore_trainings(made, "study") == (1, 0) and path.read_text() == before
