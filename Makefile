@@ -1,6 +1,6 @@
 # `make`: the default study.  `make tiny`: its smallest form.  `make docs`: the documentation.
 # `make skin`, `make grasps`, `make probe`: a robot skin, grasps by a robot, a palpation sensor; `make tiny-skin` and so on: their smallest forms.
-# `make decide`: do the paper's claims hold? Eight hours of two cores.  `make markers`: images of a gel with a camera, within an hour.
+# `make decide`: do the paper's claims hold? Ten hours of two cores.  `make markers`: images of a gel with a camera, within an hour.
 # `make real`: gels with a camera against measured data, which docs/how-to/real_gels.md names.
 # `make everything`: all default studies.  `make studies`: the smallest forms of all.  `make overview`: Snakemake's report of them.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
