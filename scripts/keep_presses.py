@@ -183,7 +183,7 @@ def main() -> None:
             trained, left = restore_trainings(jobs, name)
             print(f"{count} presses restored to results/{name}/presses; {other} records are of other settings and were left. "
                   f"{trained} trainings restored; {left} are of other settings, or wait for the readings and maps of the presses "
-                  "(snakemake --until read_truth gather_maps, then restore again).")
+                  "(snakemake --cores all --until read_truth --configfile FILE, then restore again).")
     except InputError as error:
         sys.exit(f"keep_presses: {error}")
 

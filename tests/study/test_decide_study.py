@@ -16,8 +16,9 @@ from softtact.files import write_dataset
 from softtact.geometry.generated import draw_objects
 from softtact.press.sensor import Sensor
 from softtact.studies.decide.claims import claims_of_decision
-from softtact.studies.decide.config import MODELS, load_study, read_values
+from softtact.studies.decide.config import COMPACT, MODELS, PRINTED, load_study, read_values
 from softtact.studies.decide.hypotheses import Tables, hypothesis_table, shown_objects
+from softtact.studies.decide.jobs import jobs
 from softtact.studies.decide.policies import policy_scores
 from softtact.studies.decide.pressing import press_item, sensor_of
 from softtact.studies.decide.scoring import COLUMNS, SCORES, Case, fit_gain, mean_reading
@@ -42,6 +43,17 @@ def test_the_lower_feature_stands_back_by_the_stated_step(made):
     low, high = sorted(levels[np.argsort(counts)[-2:]])
     assert (low, high) == pytest.approx((0.0, made.step_mm), abs=1e-3)
     assert mesh.is_watertight and mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_every_training_of_the_printed_network_is_a_job_and_all_scores_are_gathered(tmp_path):
+    made = jobs(load_study(read_values("config/decide.yaml")), tmp_path)
+    learned = [job for job in made if job.stage == "learn"]
+    seeds = {name: sorted(seed for job in learned if job.settings["architecture"] == name and job.settings["truth"] == "a"
+                          and job.settings["model"] == "elastic" for seed in job.settings["seeds"]) for name in (COMPACT, PRINTED)}
+    assert seeds == {COMPACT: [0, 1, 2, 3, 4], PRINTED: [0, 1, 2]} and len(learned) == 2 * len(MODELS) * (1 + 3)
+    gathered = next(job for job in made if job.stage == "gather_scores")
+    scores = [job.made()["scores"] for job in learned]
+    assert sorted(gathered.inputs["networks"]) == sorted(scores) and len(set(scores)) == len(scores)
 
 
 def test_the_steps_are_spread_over_their_range():

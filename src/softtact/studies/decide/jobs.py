@@ -21,7 +21,17 @@ import numpy as np
 
 from softtact.sensors.library import material_file
 from softtact.studies.configuration import found_sensor
-from softtact.studies.decide.config import COMPACT, HYPERELASTIC, MATCHED, MODELS, PRINTED, DecideItem, DecideStudy, Pressing
+from softtact.studies.decide.config import (
+    COMPACT,
+    HYPERELASTIC,
+    MATCHED,
+    MODELS,
+    PRINTED,
+    DecideItem,
+    DecideStudy,
+    Pressing,
+    Trainings,
+)
 from softtact.studies.jobs import Job, figure_files, from_here
 
 TABLES = ("scores", "hypotheses", "learning_curve", "power", "robustness", "collapse")
@@ -131,27 +141,28 @@ class _Jobs:
 
     def learning(self) -> list[Job]:
         """The trainings of networks on one model's maps and one truth's readings, and the compact network's learning curve."""
-        plan = self.values.learning
-        trainings = [(COMPACT, plan.compact, list(range(plan.compact.seeds)))]
-        if plan.printed is not None:      # a training takes minutes: each is a job of its own
-            trainings += [(PRINTED, plan.printed, [seed]) for seed in range(plan.printed.seeds)]
-        made = {"scores": f"{self.folder}/learning/{{truth}}/{{model}}_{{network}}.csv"}
-        learned = [self._trained("learn", truth, model, made, architecture, trained, {"seeds": seeds}, len(seeds), {
-            "network": architecture if architecture == COMPACT else f"{architecture}_{seeds[0]}"})
-            for truth in plan.truths for model in MODELS for architecture, trained, seeds in trainings]
-        curve = {"curve": f"{self.folder}/learning/{{truth}}/{{model}}_curve.csv"}
-        return [*learned, *(self._trained("trace_curve", truth, model, curve, COMPACT, plan.compact, {"shares": plan.curve},
-                                          len(plan.curve), {}) for truth in plan.truths for model in MODELS)]
+        plan, learned = self.values.learning, f"{self.folder}/learning/{{truth}}/{{model}}"
+        trainings = [(COMPACT, COMPACT, plan.compact, list(range(plan.compact.seeds)))]
+        if plan.printed is not None:      # one takes minutes: each is a job of its own
+            trainings += [(f"{PRINTED}_{seed}", PRINTED, plan.printed, [seed]) for seed in range(plan.printed.seeds)]
+        made = []
+        for about in [{"truth": truth, "model": model} for truth in plan.truths for model in MODELS]:
+            for network, architecture, trained, seeds in trainings:
+                settings, work = self._training(architecture, trained, len(seeds))
+                made.append(Job("learn", self.maps(about["truth"]), {"scores": f"{learned}_{{network}}.csv"},
+                                about | settings | {"seeds": seeds}, about | {"network": network}, work))
+            settings, work = self._training(COMPACT, plan.compact, len(plan.curve))
+            made.append(Job("trace_curve", self.maps(about["truth"]), {"curve": f"{learned}_curve.csv"},
+                            about | settings | {"shares": plan.curve}, about, work))
+        return made
 
-    def _trained(self, stage, truth, model, made, architecture, trained, settings, times, wildcards):
-        """A job that trains an architecture some times."""
+    def _training(self, architecture: str, trained: Trainings, times: int) -> tuple[dict[str, Any], dict[str, float]]:
+        """Settings of a job that trains an architecture some times, and its work."""
         plan = self.values.learning
-        common = {"truth": truth, "model": model, "architecture": architecture, "seed": self.values.seed, "device": plan.device,
-                  "validation_share": plan.validation_share, "ssim_window": self.values.ssim_window,
-                  "trained": trained.model_dump(mode="json", exclude={"seeds"})}
-        maps = len(self.study.indenters) * len(self.forces) * trained.epochs * times
-        return Job(stage, self.maps(truth), made, common | settings, {"truth": truth, "model": model, **wildcards},
-                   {f"{architecture}_maps": maps})
+        settings = {"architecture": architecture, "seed": self.values.seed, "device": plan.device,
+                    "validation_share": plan.validation_share, "ssim_window": self.values.ssim_window,
+                    "trained": trained.model_dump(mode="json", exclude={"seeds"})}
+        return settings, {f"{architecture}_maps": len(self.study.indenters) * len(self.forces) * trained.epochs * times}
 
     def judging(self) -> list[Job]:
         """Scores, power, hypotheses, and the maps of robustness and collapse."""
