@@ -135,3 +135,15 @@ def test_memory_that_does_not_suffice_is_a_sentence(monkeypatch, capsys):
     monkeypatch.setattr(mesh_command, "_complexity", lambda options: np.empty(1 << 50))
     assert main(["complexity", "part.stl", "--unit", "mm"]) == 4
     assert "softtact complexity: there is not enough memory (Unable to allocate 8.00 PiB" in capsys.readouterr().err
+
+
+def test_a_process_works_after_this_one_has_used_threads_of_openmp():
+    """GNU's OpenMP waits in a forked process for its parent's threads, without end."""
+    pytest.importorskip("torch")
+    script = ("import torch\n"
+              "from softtact.processes import call_apart\n"
+              "def summed():\n"
+              "    return float(torch.nn.functional.max_pool2d(torch.ones(64, 80, 57, 33), 2, 1).sum())\n"
+              "torch.set_num_threads(2)\n"
+              "assert summed() == call_apart(summed)\n")
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60)

@@ -17,6 +17,8 @@ from functools import partial
 from types import FrameType
 from typing import Any, TypeVar
 
+from threadpoolctl import ThreadpoolController
+
 from softtact.errors import WorkerError
 
 _Item = TypeVar("_Item")
@@ -126,10 +128,14 @@ def map_in_processes(function: Callable[[_Item], _Result], items: Sequence[_Item
 
 
 def _begin(function, parent):
-    """Prepare a new process: the parent reacts to Ctrl-C, and ends it."""
+    """Prepare a new process: the parent reacts to Ctrl-C, and ends it.
+
+    GNU's OpenMP takes one thread alone: with more, a forked process waits without end for those that its parent had.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with(parent)
+    ThreadpoolController().select(prefix="libgomp").limit(limits=1)
     global _function     # the one that a process calls
     _function = function
 
