@@ -9,7 +9,7 @@ from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
 from softtact.fem import elements
 from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET4, TET10, TRI3, TRI6, WEDGE18, Element, reference_gradients
-from softtact.fem.quadrature import gauss, lobatto_gauss_rule, lobatto_rule
+from softtact.fem.quadrature import densest_rule, gauss, lobatto_gauss_rule, lobatto_rule
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 
@@ -95,9 +95,9 @@ def test_lobattos_rule_has_the_corners_and_integrates_polynomials_of_the_third_d
     assert rule.weights @ rule.points[:, 0]**4 != pytest.approx(integral(HEX20, (4, 0, 0)), abs=1e-6)
 
 
-def test_simpsons_and_gausss_rule_together_integrate_two_degrees_more_than_each():
-    rule = lobatto_gauss_rule(3)
-    assert len(rule.points) == 27 + 8 and (rule.weights > 0).all() and (np.abs(rule.points) == 1.0).all(axis=1).sum() == 8
+@pytest.mark.parametrize("rule, points", [(lobatto_gauss_rule(3), 27 + 8), (densest_rule(3), 27 + 8 + 27)])
+def test_simpsons_and_gausss_rules_together_integrate_two_degrees_more_than_simpsons(rule, points):
+    assert len(rule.points) == points and (rule.weights > 0).all() and (np.abs(rule.points) == 1.0).all(axis=1).sum() == 8
     for powers in product(range(6), repeat=3):
         if sum(powers) <= rule.degree == 5:
             assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(HEX20, powers), abs=1e-14)

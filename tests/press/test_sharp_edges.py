@@ -12,6 +12,7 @@ from support.laws import LAWS
 from softtact.contact.height_field import HeightField
 from softtact.contact.rounded_object import EDGE_RADIUS_MM
 from softtact.errors import ConvergenceError
+from softtact.fem.graded_mesh import CoverMesh
 from softtact.materials.config import law_from_printed
 from softtact.models.hyperelastic import newton, path
 from softtact.models.hyperelastic.body import LayeredBody
@@ -52,6 +53,39 @@ def test_a_load_step_in_which_the_cover_would_fold_is_repeated_with_one_that_doe
     result = press(tilted_wall(), 2.0, quality=MeshSettings.draft())
     assert result.least_volume_ratio[0] > 0.4 and result.within_validity[0] and result.edge_radius_mm[0] == EDGE_RADIUS_MM
     assert 1.05 < result.indentation_mm[0] < 1.3
+
+
+def test_a_load_step_folded_between_the_points_of_a_cover_that_resists_is_repeated_with_points_wherever_folds_are_looked_for(
+        monkeypatch):
+    """The first load step is taken for such a one; it and those after it have the 62 points then, and all their iterations."""
+    at_corners = press(tilted_wall(), 1.0, 2.0, quality=MeshSettings.draft())
+    rules, evaluate = [], LayeredBody.evaluate
+    monkeypatch.setattr(LayeredBody, "folds_between", lambda self, state: self.slab.resists_folding == 1)
+    monkeypatch.setattr(LayeredBody, "evaluate", lambda self, *of: rules.append(self.slab.resists_folding) or evaluate(self, *of))
+    result = press(tilted_wall(), 1.0, 2.0, quality=MeshSettings.draft())
+    assert rules == sorted(rules) and rules[-1] == 2 and result.steps == 2
+    assert result.iterations[0] > at_corners.iterations[0] and result.least_volume_ratio.min() > 0
+    assert result.indentation_mm == pytest.approx(at_corners.indentation_mm, rel=0.02)
+
+
+def test_a_wall_that_slipped_between_the_points_before_edges_were_rounded_is_pressed_anew_from_first_touch():
+    """At 1 N the coarse mesh of sharp edges lets it down by 1.34 mm, from where it cuts on through the cover; rounded, it rests at
+    0.74 mm."""
+    at_once, after = (press(tilted_wall(), *forces) for forces in ((2.0,), (1.0, 2.0)))
+    assert after.edge_radius_mm.tolist() == [0.0, EDGE_RADIUS_MM] and after.indentation_mm[0] > at_once.indentation_mm[0]
+    assert after.indentation_mm[1] == pytest.approx(at_once.indentation_mm[0], rel=0.02)
+
+
+def test_an_element_folds_between_the_points_that_resist_only_where_it_could_have_more(monkeypatch):
+    body = small_body()
+    state = body.evaluate(*body.rest(), 0.0, far_above(body))
+    monkeypatch.setattr(CoverMesh, "least_volume_ratio", lambda self, displacement: -0.03)
+    folds = []
+    for resists in (0, 1, 2):
+        body.slab.resist_folding(resists)
+        folds.append((body.folds(state), body.folds_between(state)))
+    assert folds == [(True, False), (False, True), (False, False)]
+    body.close()
 
 
 def test_a_wall_that_too_few_points_of_a_coarse_mesh_carry_is_flagged():

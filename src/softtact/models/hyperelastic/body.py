@@ -195,7 +195,7 @@ class LayeredBody:
 
     def begin(self) -> None:
         """Discard all tangents and factors of an earlier press, since they would change the last digits of a result."""
-        self.slab.resist_folding(False)
+        self.slab.resist_folding(0)
         self.slab.top.round_edges(False)
         self.cells.reset()
         self._forget_factors()
@@ -207,17 +207,26 @@ class LayeredBody:
 
     def folds(self, state: BodyState) -> bool:
         """Whether an element of the cover is folded, and the cover does not yet resist that."""
-        return not self.slab.resists_folding and self.slab.cover_mesh.least_volume_ratio(state.slab.displacement) <= 0
+        return not self.slab.resists_folding and self._folded(state)
+
+    def folds_between(self, state: BodyState) -> bool:
+        """Whether an element of the cover is folded between the points at which it resists that, and it could have more points."""
+        return self.slab.resists_folding == 1 and self._folded(state)
+
+    def _folded(self, state):
+        return self.slab.cover_mesh.least_volume_ratio(state.slab.displacement) <= 0
 
     def has_points_of(self, state: BodyState) -> bool:
         """Whether a state has the contact points that the cover has now."""
         return len(state.slab.gaps) == len(self.slab.top.area)
 
-    def resisting_folding(self, state: BodyState, surface: ObjectSurface) -> BodyState:
+    def resisting_folding(self, state: BodyState, surface: ObjectSurface, *, between: bool = False) -> BodyState:
         """The state, at which no element is folded, with a cover that resists folding under an object with rounded edges, if its
         surface has them, until `begin`. The history of the contact with the object begins anew.
+
+        between: whether it resists at all points, once it `folds_between` those that suffice nearly always
         """
-        self.slab.resist_folding(True)
+        self.slab.resist_folding(max(2 if between else 1, self.slab.resists_folding))
         self.slab.top.round_edges(getattr(surface, "rounded", None) is not None)
         self._forget_factors()
         displacement, history = state.slab.displacement, BodyHistory(self.slab.top.fresh_history(), state.support.history)

@@ -188,10 +188,11 @@ def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterab
         rest = LoadStep(0.0, _untouched(body, surface, stop_mm), iterations=0, residual_n=0.0, penetration_mm=0.0)
         yield from (_stopped_at(rest, float(force)) for force in forces_n)
         return
-    state, reached, stopped = first_touch(body, surface, settings), 0.0, None
+    touch = first_touch(body, surface, settings)
+    state, reached, stopped = touch, 0.0, None
     for force in map(float, forces_n):
         if stopped is None:
-            load_step, stopped = _up_to(body, surface, state, reached, force, stop_mm, settings)
+            load_step, stopped = _reached_or_anew(body, surface, touch, state, reached, force, stop_mm, settings)
             state, reached = load_step.state, load_step.force_n
         yield load_step if stopped is None else _stopped_at(stopped, force)
 
@@ -199,6 +200,21 @@ def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterab
 def _stopped_at(load_step, force):
     """The load step of a larger force after the object came to rest on the shell: the body's force is that of `load_step`."""
     return replace(load_step, force_n=force, elsewhere_n=force - load_step.state.force)
+
+
+def _reached_or_anew(body, surface, touch, state, reached, force, stop_mm, settings):
+    """What `_up_to` finds from a state, else, if that is one of sharp edges and those of now are rounded, from the first `touch`.
+
+    A wall that slipped between the points of a coarse mesh is so deep in a cover of more points that it would cut through it.
+    """
+    try:
+        return _up_to(body, surface, state, reached, force, stop_mm, settings)
+    except TimeLimitError:
+        raise
+    except ConvergenceError:
+        if body.has_points_of(state):
+            raise
+    return _up_to(body, surface, touch, 0.0, force, stop_mm, settings)
 
 
 def _up_to(body, surface, state, reached, force, stop_mm, settings):
@@ -285,15 +301,24 @@ def _after(before: Control, step: MotionStep) -> Control:
 
 
 def _advance(body, surface, state, reached, stage, settings):
-    """Reach the stage's end; the increment is halved where Newton's method fails and doubled where it succeeds.
+    """Reach the stage's end; again, if its balance is folded between the points at which a cover resists folding, with more."""
+    load_step = _in_increments(body, surface, state, reached, stage, settings)
+    if not body.folds_between(load_step.state):
+        return load_step
+    again = _in_increments(body, surface, state, reached, stage, settings, between=True)
+    return replace(again, iterations=load_step.iterations + again.iterations)
+
+
+def _in_increments(body, surface, state, reached, stage, settings, *, between=False):
+    """Reach the stage's end in increments; one is halved where Newton's method fails and doubled where it succeeds.
 
     An increment starts from the last converged state. Extrapolated displacements start with worse contact states and took as many
     iterations or more, since the Newton step is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
     One that folds the cover, whether it converges or not, is repeated with a cover that resists, as in all increments after it.
     """
-    iterations, counted, increment, settled = 0, 0, stage.end - reached, body.has_points_of(state)
+    iterations, counted, increment, settled = 0, 0, stage.end - reached, body.has_points_of(state) and not between
     if not settled:      # an earlier stage from this state folded the cover
-        state = _resisting(body, surface, state)
+        state = _resisting(body, surface, state, between=between)
     while True:
         at = min(stage.end, reached + increment, stage.reach(body, reached, settings))
         control = stage.control(at)
@@ -325,9 +350,9 @@ def _advance(body, surface, state, reached, stage, settings):
             reached, state, settled = at, found.state, True
 
 
-def _resisting(body, surface, state):
+def _resisting(body, surface, state, *, between=False):
     """The state with a cover that resists folding, under the object where it is."""
-    return body.resisting_folding(state, MovedSurface(surface, state.slab.projection.offset_mm))
+    return body.resisting_folding(state, MovedSurface(surface, state.slab.projection.offset_mm), between=between)
 
 
 def _force(control, state):

@@ -19,7 +19,7 @@ from softtact.fem.elements import HEX20, QUAD8
 from softtact.fem.extruded_mesh import HexMesh, SheetMesh2D, extrude, interpolation_2d
 from softtact.fem.graded_mesh import CoverMesh, cover_mesh
 from softtact.fem.kernels import add_forces
-from softtact.fem.quadrature import lobatto_gauss_rule
+from softtact.fem.quadrature import densest_rule, lobatto_gauss_rule
 from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.fem.static_condensation import make_positive
 from softtact.linalg.symmetric_product import SymmetricProduct
@@ -29,6 +29,8 @@ from softtact.models.hyperelastic.rigid_contact import TopContact
 from softtact.models.hyperelastic.states import ContactHistory, ContactProjection, LinearGaps, ObjectSurface, SlabState
 
 _NO_WEIGHT = 1e-12
+# Rules of the cover's elements: one that may fold; with points at corners, too; with all points where `CoverMesh` looks for folds.
+_COVER_RULES = (HEX20.reduced, lobatto_gauss_rule(3), densest_rule(3))
 _FOLDING_PENALTY_RATIO = 100.0     # quartic modulus over mu of a cover that resists folding, as of the frusta by default
 _AT_ONCE = 8     # elements whose tangents one thread makes positive at once; indefinite ones are often neighbours
 
@@ -205,7 +207,7 @@ class Slab:
         self.nodes = len(self.points)
         self.bottom = self.sheet_nodes.number[self.sheet_mesh.planes[0]]
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
-        self._cover_law, self.resists_folding = cover.law, False
+        self._cover_law, self.resists_folding = cover.law, 0
         self._values_at: np.ndarray | None = None     # displacement of the cached values of `_beside_cells`
         self.groups += self._cover_groups()
         self._add_sheet(sheet_mesh_2d, [sheet.law] * self.sheet_layers + [cover.law] * bound)
@@ -236,13 +238,13 @@ class Slab:
         return groups
 
     def _cover_block(self, hexes):
-        rule, ratio = HEX20.reduced, self._quartic_penalty_ratio
-        if self.resists_folding:
-            rule, ratio = lobatto_gauss_rule(3), max(ratio, _FOLDING_PENALTY_RATIO)
-        return HexBlock(self.cover_mesh.points[hexes], self._cover_law, rule=rule, quartic_penalty_ratio=ratio)
+        ratio = max(self._quartic_penalty_ratio, _FOLDING_PENALTY_RATIO if self.resists_folding else 0.0)
+        return HexBlock(self.cover_mesh.points[hexes], self._cover_law, rule=_COVER_RULES[self.resists_folding],
+                        quartic_penalty_ratio=ratio)
 
-    def resist_folding(self, resists: bool) -> None:
-        """Give the cover's elements points at their corners, which cannot turn inside out then, and a quartic penalty; or undo it.
+    def resist_folding(self, resists: int) -> None:
+        """Give the cover's elements a quartic penalty, and points at which they cannot turn inside out: 1 at their corners and
+        between these, 2 at more places between; or undo it (0).
 
         Under an edge sharper than an element its corners fold, which a rule with eight points inside does not see.
         """
