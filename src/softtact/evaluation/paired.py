@@ -2,9 +2,11 @@
 
 A table of differences (object, seed) has one value for each object and each seed of a training; a seed is the same for all objects.
 Objects and seeds are drawn with replacement, independently of each other (crossed): maps of one object are alike, and so are
-all scores of one training. With few objects plain percentiles are too narrow; they are taken farther out, to where
-Student's interval of a normal sample ends (expanded percentiles, Hesterberg 2015). The p-value is the level at which that
-interval reaches the bound. Several tests of one claim share its level by Holm's rule (Holm 1979).
+all scores of one training. Drawn so, the mean of n scatters too little, by the root of (n - 1) / n: of three seeds by a fifth.
+So what belongs to an object, and what to a seed, is enlarged by as much before. With few of either percentiles are too narrow,
+besides; they are taken farther out, to where Student's interval of a normal sample ends (expanded percentiles, Hesterberg 2015),
+with the degrees of freedom of both scatters together (Satterthwaite 1946). The p-value is the level at which that interval
+reaches the bound. Several tests of one claim share its level by Holm's rule (Holm 1979).
 """
 
 from collections.abc import Sequence
@@ -53,24 +55,46 @@ def compare(differences: np.ndarray, *, bound: float = 0.0, level: float = 0.95,
         return Comparison(mean, np.nan, np.nan, 1.0, 1.0, objects, seeds)
     if np.ptp(table) == 0:
         return Comparison(mean, mean, mean, float(mean <= bound), float(mean >= bound), objects, seeds)
-    return _compared(mean, bootstrap_means(table, draws=draws, seed=seed), bound, objects, seeds, level)
+    freedom = _freedom([(_variance(table.mean(axis=1)), objects), (_variance(table.mean(axis=0)), seeds)])
+    return _compared(mean, bootstrap_means(_enlarged(table), draws=draws, seed=seed), bound, (objects, seeds), freedom, level)
 
 
-def _compared(mean, means, bound, objects, seeds, level):
-    """The `Comparison` of a mean whose bootstrap gave `means` (draws,)."""
+def _enlarged(table):
+    """The table with what belongs to its objects, and to its seeds, enlarged by what drawing with replacement takes from it."""
+    of_objects, of_seeds = (table.mean(axis=axis, keepdims=True) - table.mean() for axis in (1, 0))
+    objects, seeds = table.shape
+    grown = [np.sqrt(count / (count - 1)) - 1 if count > 1 else 0.0 for count in (objects, seeds)]
+    return table + grown[0] * of_objects + grown[1] * of_seeds
+
+
+def _variance(means):
+    """Of the mean of some means."""
+    return float(means.var(ddof=1) / len(means)) if len(means) > 1 else 0.0
+
+
+def _freedom(parts):
+    """Degrees of freedom of a sum of variances of means, [(variance, number of means)]; inf of one that is 0."""
+    whole = sum(variance for variance, _ in parts)
+    return whole**2 / sum(variance**2 / (count - 1) for variance, count in parts if count > 1) if whole > 0 else np.inf
+
+
+def _compared(mean, means, bound, counts, freedom, level):
+    """The `Comparison` of a mean whose bootstrap gave `means` (draws,), of counts (objects, seeds)."""
     if np.ptp(means) == 0:
-        return Comparison(mean, mean, mean, float(mean <= bound), float(mean >= bound), objects, seeds)
-    tail = stats.norm.cdf(-np.sqrt(objects / (objects - 1)) * stats.t.ppf(0.5 * (1 + level), objects - 1))
+        return Comparison(mean, mean, mean, float(mean <= bound), float(mean >= bound), *counts)
+    out = stats.t.ppf(0.5 * (1 + level), freedom)
+    tail = stats.norm.cdf(-out)
     low, high = np.quantile(means, [tail, 1 - tail])
-    above, below = (_p_value(sign * (means - bound), objects) for sign in (1, -1))
-    return Comparison(mean, float(low), float(high), above, below, objects, seeds)
+    if tail * len(means) < _FEWEST:     # beyond the last draws as if the means were normal
+        low, high = means.mean() - out * means.std(), means.mean() + out * means.std()
+    above, below = (_p_value(sign * (means - bound), freedom) for sign in (1, -1))
+    return Comparison(mean, float(low), float(high), above, below, *counts)
 
 
 def compare_groups(first: np.ndarray, second: np.ndarray, *, level: float = 0.95, draws: int = DRAWS, seed: int = 0) -> Comparison:
     """`Comparison` with 0 of how much larger the mean of the first differences (object, seed) is than that of the second ones.
 
-    Objects of the two are others and are drawn independently; seeds are the same. Student's interval has the degrees of freedom of
-    the smaller group.
+    Objects of the two are others and are drawn independently; seeds are the same.
     """
     tables = [np.atleast_2d(np.asarray(one, dtype=float).T).T for one in (first, second)]
     objects, seeds = min(len(one) for one in tables), tables[0].shape[1]
@@ -79,8 +103,11 @@ def compare_groups(first: np.ndarray, second: np.ndarray, *, level: float = 0.95
         return Comparison(mean, np.nan, np.nan, 1.0, 1.0, objects, seeds)
     rng = np.random.default_rng(seed)
     columns = _weights(rng, seeds, draws)
-    one, other = (np.einsum("do,os,ds->d", _weights(rng, len(table), draws), table, columns, optimize=True) for table in tables)
-    return _compared(mean, one - other, 0.0, objects, seeds, level)
+    one, other = (np.einsum("do,os,ds->d", _weights(rng, len(table), draws), _enlarged(table), columns, optimize=True)
+                  for table in tables)
+    parts = [(_variance(table.mean(axis=1)), len(table)) for table in tables]
+    of_seeds = tables[0].mean(axis=0) - tables[1].mean(axis=0)
+    return _compared(mean, one - other, 0.0, (objects, seeds), _freedom([*parts, (_variance(of_seeds), seeds)]), level)
 
 
 def bootstrap_means(table: np.ndarray, *, draws: int, seed: int) -> np.ndarray:
@@ -95,11 +122,11 @@ def _weights(rng, count, draws):
     return rng.multinomial(count, np.full(count, 1 / count), size=draws) / count
 
 
-def _p_value(means, objects):
+def _p_value(means, freedom):
     """The level whose expanded percentile of the means (draws,) is 0; beyond the last draws as if the means were normal."""
     share = (means <= 0).mean()
     quantile = stats.norm.ppf(share) if _FEWEST <= share * len(means) <= len(means) - _FEWEST else -means.mean() / means.std()
-    return float(stats.t.cdf(quantile * np.sqrt((objects - 1) / objects), objects - 1))
+    return float(stats.t.cdf(quantile, freedom))
 
 
 def holm(p_values: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -127,19 +154,25 @@ def permutation_p(gains: np.ndarray, shares: np.ndarray, *, draws: int = DRAWS, 
 
 
 def verdict(p_above: float, p_below: float, *, objects: int, least_objects: int, level: float = 0.05) -> str:
-    """Of adjusted p-values: `holds` or `fails` where one side is excluded, else, and with few objects always, `undecided`."""
+    """`holds` or `fails` where one side is excluded, else, and with few objects always, `undecided`.
+
+    level: of both sides together, half of it for each: the chance of a verdict where there is no difference
+    """
     if objects < least_objects:
         return UNDECIDED
-    return HOLDS if p_above < level else FAILS if p_below < level else UNDECIDED
+    return HOLDS if p_above < 0.5 * level else FAILS if p_below < 0.5 * level else UNDECIDED
 
 
-def power(effect: float, *, objects: int, seeds: int, object_sd: float, seed_sd: float, level: float) -> float:
-    """Chance that Student's test tells a mean above 0 at a level, of normal differences with this mean and these spreads.
+def power(effect: float, *, objects: int | Sequence[int], seeds: int, object_sd: float, seed_sd: float, level: float) -> float:
+    """Chance that Student's test tells a mean above 0, one side of it, at a level, of normal differences with these spreads.
 
-    object_sd: standard deviation between objects;  seed_sd: of one training against another, the same for all objects
-    By the noncentral t distribution; the trainings' spread counts to that of the mean.
+    objects: their number, or those of two groups whose means are compared;  object_sd: standard deviation between objects
+    seed_sd: of one training against another, the same for all objects; nothing where there is a single seed, of a formula
+    By the noncentral t distribution, with degrees of freedom as in `compare`.
     """
-    if objects < 2:
+    sizes = [objects] if isinstance(objects, int) else list(objects)
+    if min(sizes) < 2:
         return 0.0
-    spread = np.sqrt(object_sd**2 / objects + seed_sd**2 / seeds)
-    return float(stats.nct.sf(stats.t.isf(level, objects - 1), objects - 1, effect / spread))
+    parts = [(object_sd**2 / size, size) for size in sizes] + ([(seed_sd**2 / seeds, seeds)] if seeds > 1 else [])
+    spread, freedom = np.sqrt(sum(variance for variance, _ in parts)), _freedom(parts)
+    return float(stats.nct.sf(stats.t.isf(level, freedom), freedom, effect / spread))

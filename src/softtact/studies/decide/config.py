@@ -24,6 +24,7 @@ ELASTIC, ELECTRODES, MATCHED, FOUNDATION, HYPERELASTIC = MODELS = (
     "elastic", "electrodes", "matched", "foundation", "hyperelastic")
 CONTROLS = {"ceiling": HYPERELASTIC, "flipped": MATCHED}     # truths that are tested models
 INDENTERS = "indenters"
+FORMULAS = GAP, QUADRATIC = "gap", "quadratic"      # readouts that are fitted
 COMPACT, PRINTED = "compact", "printed"      # networks
 
 
@@ -93,7 +94,7 @@ class Assumed(Section):
 class Statistics(Section):
     """How verdicts are reached."""
 
-    level: Fraction = Field(description="of all tests of a claim together, by Holm's rule")
+    level: Fraction = Field(description="chance of a verdict on a claim where there is no difference, half of it for each side")
     least_objects: PositiveInt = Field(description="with fewer, every verdict is undecided")
     margin: PositiveFloat = Field(description="by which the hybrid's score may be worse than the hyperelastic model's")
     cost_share: PositiveFloat = Field(description="of the hyperelastic model's time that the hybrid may take")

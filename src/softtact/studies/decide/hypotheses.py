@@ -1,6 +1,8 @@
 """The hypotheses, each tested for every truth, readout and primary score; what is said of them in one row.
 
-More is better in every difference: the error enters with a minus. Families, whose tests share one level by Holm's rule:
+More is better in every difference: the error enters with a minus. Each test has a verdict alone, at the level itself, and one by
+Holm's rule with the others of its family: a claim for which all have to hold needs each alone, one that a single test can refute
+needs Holm's. Families:
 detail         hyperelastic minus elastic on stepped objects is above 0
 detail_more    it is larger on stepped than on smooth objects
 not_stiffness  hyperelastic minus matched elastic on stepped objects is above 0: more than stiffness. Undecided where the matched
@@ -27,12 +29,13 @@ from softtact.studies.decide.policies import HYBRID, remeshed_choices
 from softtact.studies.decide.scoring import PRIMARY
 
 COLUMNS = ["claim", "truth", "readout", "score", "objects", "seeds", "mean", "low", "high", "bound", "p_above", "p_below", "p_holm",
-           "p_holm_below", "power", "verdict", "remark"]
+           "p_holm_below", "power", "alone", "verdict", "remark"]
 FAMILIES = ("detail", "detail_more", "not_stiffness", "balance", "choice", "cost", "collapse")
 OF_DETAIL = ("detail", "detail_more", "not_stiffness")
 _BUSY = 1.25     # load per core above which a machine was not idle; two jobs on two cores give 1
 _REACHED = 1.0   # step over indentation, below which the lower feature touches
 _WORSE = "no control of stiffness, as the matched layer scores less than the printed one"
+_SAME = 1e-6     # of a force that a press reached and one that was asked for
 _POINTS = 2      # of a curve at least, between which it is interpolated
 
 
@@ -147,29 +150,40 @@ def _apart(own, model):
 
 
 def _judged(table, tables, statistics, truths):
-    """The table with Holm's p-values, the stated power and the verdicts."""
+    """The table with Holm's p-values, the stated power and both verdicts."""
     table = table.assign(p_holm=table.p_above, p_holm_below=table.p_below)
     control = table.truth.isin(list(CONTROLS))
     for claim in FAMILIES:
         own = (table.claim == claim) & ~control
         table.loc[own, "p_holm"], table.loc[own, "p_holm_below"] = holm(table.p_above[own]), holm(table.p_below[own])
-    power = tables.power.set_index("claim").power
-    table["power"] = table.claim.map(power)
-    shown = shown_objects(tables.collapse, share=statistics["shown_share"])
-    table["verdict"] = [_verdict(row, statistics, shown, truths) for row in table.itertuples()]
+    of_each = tables.power.set_index(["claim", "readout"]).power
+    table["power"] = of_each.reindex(pd.MultiIndex.from_frame(table[["claim", "readout"]])).to_numpy()
+    shown = shown_in_scored(tables.scores, tables.collapse, share=statistics["shown_share"])
+    rows = list(table.itertuples())
+    table["alone"] = [_verdict(row, (row.p_above, row.p_below), statistics, shown, truths) for row in rows]
+    table["verdict"] = [_verdict(row, (row.p_holm, row.p_holm_below), statistics, shown, truths) for row in rows]
     return table
 
 
-def _verdict(row, statistics, shown, truths):
-    """The verdict of a row; details need a truth that contains them, stiffness a control, a cost an idle machine."""
+def _verdict(row, p_values, statistics, shown, truths):
+    """The verdict of a row; details need a truth that contains them, stiffness a control, a cost no load of others."""
     if row.claim in OF_DETAIL and row.truth in truths and shown.get(row.truth, 0) < statistics["least_shown"]:
         return UNDECIDED
     if str(row.remark).startswith(_WORSE):
         return UNDECIDED
     if row.claim == "cost" and str(row.remark).endswith("busy"):
         return UNDECIDED
-    return verdict(row.p_holm, row.p_holm_below, objects=row.objects, least_objects=statistics["least_objects"],
-                   level=statistics["level"])
+    return verdict(*p_values, objects=row.objects, least_objects=statistics["least_objects"], level=statistics["level"])
+
+
+def shown_in_scored(scores: pd.DataFrame, collapse: pd.DataFrame, *, share: float) -> dict[str, int]:
+    """{truth: how many objects' maps show the lower feature by more than a share of the raised ones' where they are scored}.
+
+    That is at the largest force at which they are: of larger ones no score tells.
+    """
+    largest = scores.groupby(["truth", "object"]).largest_force_n.max().rename_axis(["model", "object"])
+    scored = collapse.join(largest, on=["model", "object"], how="inner")
+    return shown_objects(scored[scored.force_n <= scored.largest_force_n * (1 + _SAME)], share=share)
 
 
 def shown_objects(collapse: pd.DataFrame, *, share: float) -> dict[str, int]:

@@ -23,6 +23,7 @@ from softtact.sensors.library import material_file
 from softtact.studies.configuration import found_sensor
 from softtact.studies.decide.config import (
     COMPACT,
+    FORMULAS,
     HYPERELASTIC,
     MATCHED,
     MODELS,
@@ -175,7 +176,7 @@ class _Jobs:
                       {"truth": truth}) for truth in self.study.truths]
         power = Job("state_power", {}, {"power": table["power"]},
                     {"statistics": statistics, **values.objects.model_dump(include={"smooth", "stepped"}),
-                     "seeds": values.learning.compact.seeds, "tests": self._tests()})
+                     "seeds": self._seeds(), "tests": self._tests()})
         gathered = Job("gather_scores", {"formulas": [str(job.made()["scores"]) for job in scored],
                                          "networks": [str(job.made()["scores"]) for job in learned if job.stage == "learn"],
                                          "curves": [str(job.made()["curve"]) for job in learned if job.stage == "trace_curve"],
@@ -196,8 +197,14 @@ class _Jobs:
     def _tests(self):
         """How many tests share a claim's level: truths, readouts and both primary scores."""
         of_networks = [truth for truth in self.values.learning.truths if truth in self.values.truths]
-        readouts = 2 * len(self.values.truths) + len(of_networks) * (1 + (self.values.learning.printed is not None))
+        readouts = 2 * len(self.values.truths) + len(of_networks) * (len(self._seeds()) - 2)
         return 2 * readouts
+
+    def _seeds(self):
+        """{readout: number of its trainings}; formulas have one."""
+        learning = self.values.learning
+        networks = {COMPACT: learning.compact, PRINTED: learning.printed}
+        return dict.fromkeys(FORMULAS, 1) | {name: made.seeds for name, made in networks.items() if made}
 
     def _collapse(self, table, shown):
         stepped = [item for item in self.study.objects if item.set == "stepped"]

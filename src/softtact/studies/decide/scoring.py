@@ -16,12 +16,12 @@ from softtact.learning.dataset import Samples
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.ssim import map_ssim, own_range_ssim, whole_map_ssim
 from softtact.sensors.frusta import SensorSpec
-from softtact.studies.decide.config import COMPACT, INDENTERS, MODELS, PRINTED
+from softtact.studies.decide.config import COMPACT, FORMULAS, GAP, INDENTERS, MODELS, PRINTED, QUADRATIC
 
-GAP, QUADRATIC, *_ = READOUTS = ("gap", "quadratic", COMPACT, PRINTED)
+READOUTS = (*FORMULAS, COMPACT, PRINTED)
 MEAN_READING, NO_READOUT = "mean_reading", "none"     # the contestant that reads no map: the trivial baseline of every readout
 SCORES = ["error_share", "ssim_own_range", "ssim_paper", "ssim_paper_whole"]
-COLUMNS = ["truth", "model", "readout", "seed", "object", "kind", "maps", *SCORES]
+COLUMNS = ["truth", "model", "readout", "seed", "object", "kind", "maps", "largest_force_n", *SCORES]
 PRIMARY = {"error_share": -1.0, "ssim_own_range": 1.0}     # and the sign with which more is better
 _LEAST_COUNTS = 1.0     # of a mean reading, below which an error has no share of it
 
@@ -113,17 +113,18 @@ def mean_reading(case: Case) -> tuple[Samples, np.ndarray]:
 def object_scores(samples: Samples, predicted: np.ndarray, *, window: int, data_range: float, **names: Any) -> pd.DataFrame:
     """COLUMNS without what `names` lack: a row for each object of the samples, of predicted counts (n, row, column).
 
+    maps: load steps that count;  largest_force_n: of these
     error_share: the sum of the errors over the sum of the readings, over all maps of the object;  the others: mean SSIM
     """
     measured = samples.counts.astype(float)
-    each = samples.labels[["item", "set"]].assign(
+    each = samples.labels[["item", "set", "force_n"]].assign(
         error=np.abs(predicted - measured).mean(axis=(1, 2)), reading=measured.mean(axis=(1, 2)),
         ssim_own_range=own_range_ssim(predicted, measured, window=window),
         ssim_paper=map_ssim(predicted, measured, window=window, data_range=data_range),
         ssim_paper_whole=whole_map_ssim(predicted, measured, data_range=data_range))
     rows = []
     for item, own in each.groupby("item", sort=False):
-        row = {"object": item, "kind": own["set"].iloc[0], "maps": len(own),
+        row = {"object": item, "kind": own["set"].iloc[0], "maps": len(own), "largest_force_n": own.force_n.max(),
                "error_share": own.error.sum() / max(own.reading.sum(), _LEAST_COUNTS * len(own))}
         rows.append(names | row | {name: own[name].mean() for name in SCORES[1:]})
     return pd.DataFrame(rows, columns=[name for name in COLUMNS if name in names or name not in COLUMNS[:4]])

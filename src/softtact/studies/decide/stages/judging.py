@@ -1,5 +1,6 @@
 """Power, the table of scores, the hypotheses, the claims."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,32 +11,38 @@ from softtact.sensors.frusta import SensorSpec
 from softtact.studies.decide.config import MODELS
 from softtact.studies.decide.scoring import MEAN_READING
 
-_FLAT = 0.05     # of the error: what the last step of a learning curve may fall by and count as flat
+_FLAT = 0.05     # of the error: what it may fall by for twice as many maps, at the rate of the curve's last step, to count as flat
 
 
 def state_power(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the chance that each hypothesis is found, of an assumed effect and assumed spreads; no score is read.
 
-    outputs: power (CSV: claim, objects, seeds, tests, effect, object_sd, seed_sd, level, power, power_of_first, enough)
-    settings: statistics, smooth, stepped, seeds, tests (that share a claim's level)
-    power: at the level itself;  power_of_first: at the level over the number of tests, as Holm's rule asks of the first one
-    enough: whether the power is what the statistics ask for. Differences of two groups scatter more, by the root of 2.
+    outputs: power (CSV: claim, readout, objects, others, seeds, tests, effect, object_sd, seed_sd, level, power, power_of_first,
+    power_of_claim, enough);  settings: statistics, smooth, stepped, seeds {readout: number}, tests (that share a claim's level)
+    effect: the mean's distance from its bound. A hybrid that is as good as the hyperelastic model is by the margin above it. A
+    choice is right where what it takes gains by the effect more than what it leaves, half of the objects each
+    others: objects of the second group, where two groups are compared
+    power: at half of the level, which one side has;  power_of_first: at that over the number of tests, as Holm's rule asks of
+    the first one;  power_of_claim: of all tests of the claim together if they are independent;  enough: whether the power is
+    what the statistics ask for
     """
     from softtact.evaluation.paired import power
 
-    assumed, level = settings["statistics"]["assumed"], settings["statistics"]["level"]
-    everything = settings["smooth"] + settings["stepped"]
-    sizes = {"detail": settings["stepped"], "not_stiffness": settings["stepped"], "balance": everything, "choice": everything,
-             "detail_more": min(settings["smooth"], settings["stepped"])}
+    statistics, tests = settings["statistics"], settings["tests"]
+    assumed, level, half = statistics["assumed"], statistics["level"], (settings["smooth"] + settings["stepped"]) // 2
+    groups = {"detail": [settings["stepped"]], "detail_more": [settings["stepped"], settings["smooth"]],
+              "not_stiffness": [settings["stepped"]], "balance": [2 * half], "choice": [half, half]}
     rows = []
-    for claim, objects in sizes.items():
-        spread = assumed["object_sd"] * (np.sqrt(2) if claim == "detail_more" else 1.0)
-        case = {"objects": objects, "seeds": settings["seeds"], "object_sd": float(spread), "seed_sd": assumed["seed_sd"]}
-        alone, first = (power(assumed["effect"], level=one, **case) for one in (level, level / settings["tests"]))
-        rows.append({"claim": claim, "effect": assumed["effect"], **case, "tests": settings["tests"], "level": level,
-                     "power": alone,
-                     "power_of_first": first, "enough": alone >= settings["statistics"]["power"]})
-    write_csv(outputs["power"], pd.DataFrame(rows))
+    for (claim, sizes), (readout, seeds) in product(groups.items(), settings["seeds"].items()):
+        case = {"objects": sizes, "seeds": seeds, "object_sd": assumed["object_sd"], "seed_sd": assumed["seed_sd"]}
+        effect = statistics["margin"] if claim == "balance" else assumed["effect"]
+        alone, first = (power(effect, level=0.5 * level / count, **case) for count in (1, tests))
+        rows.append({"claim": claim, "readout": readout, **case, "objects": sizes[0], "others": sum(sizes[1:]), "effect": effect,
+                     "tests": tests, "level": level, "power": alone, "power_of_first": first,
+                     "enough": alone >= statistics["power"]})
+    table = pd.DataFrame(rows)
+    each = tests / len(settings["seeds"])     # as many for each readout
+    write_csv(outputs["power"], table.assign(power_of_claim=table.groupby("claim").power.transform("prod") ** each))
 
 
 def gather_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -66,11 +73,14 @@ def baseline_of_readouts(scores: pd.DataFrame) -> pd.DataFrame:
 
 
 def with_flatness(curve: pd.DataFrame) -> pd.DataFrame:
-    """The rows with `last_fall`, the share by which the error fell in the last step of its curve, and whether its end is `flat`."""
+    """The rows with `last_fall`, the share by which the error falls for twice as many indenters, at the rate of the last step of its
+    curve, and whether its end is `flat`.
+    """
     falls = {}
     for key, own in curve.groupby(["truth", "model"], sort=False):
-        errors = own.sort_values("share").error_share.to_numpy()
-        falls[key] = 1 - errors[-1] / errors[-2] if len(errors) > 1 else np.nan
+        end = own.sort_values("share").iloc[-2:]
+        rate = np.diff(np.log(end.error_share)) / np.diff(np.log(end.share))
+        falls[key] = float(1 - 2 ** rate[0]) if len(rate) else np.nan
     fall = np.array([falls[key] for key in zip(curve.truth, curve.model, strict=True)], dtype=float)
     return curve.assign(last_fall=fall, flat=np.abs(fall) < _FLAT)
 

@@ -64,6 +64,8 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     A row for all forces (force_n: all), whose one gain fits no linear layer to a sensor that stiffens, and one for each force.
     Read by the gap formula, whose one gain is fitted to the other objects, and of a single object to itself. With fewer objects
     than the statistics ask for every verdict is undecided: means and intervals then orient, they test nothing.
+    Counted are load steps at which the truth and all tested models hold, so that all are scored on the same maps; `objects` is how
+    many have one.
     """
     spec, count = SensorSpec.from_yaml(inputs["sensor"]), len(settings["objects"])
     tested = {model: [read_dataset(path) for path in inputs[f"presses_{model}"]] for model in (ELASTIC, MATCHED, HYPERELASTIC)}
@@ -71,9 +73,11 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     for number, varied in enumerate(settings["variants"]):
         truths = [read_dataset(path) for path in inputs["variants"][number * count:(number + 1) * count]]
         for force in ["all", *(settings["forces_n"] if len(settings["forces_n"]) > 1 else [])]:
-            errors = {model: _errors(spec, truths, presses, force) for model, presses in tested.items()}
-            row = varied | {"force_n": force if force == "all" else f"{force:g}", "objects": count}
-            row |= {f"error_{model}": float(np.nanmean(values)) for model, values in errors.items()}
+            held = [_held(truth, presses, force) for truth, *presses in zip(truths, *tested.values(), strict=True)]
+            errors = {model: _errors(spec, truths, presses, held) for model, presses in tested.items()}
+            row = varied | {"force_n": force if force == "all" else f"{force:g}", "objects": sum(one.any() for one in held)}
+            row |= {f"error_{model}": values[np.isfinite(values)].mean() if np.isfinite(values).any() else np.nan
+                    for model, values in errors.items()}
             for other in (ELASTIC, MATCHED):
                 row |= _nearer(errors[other] - errors[HYPERELASTIC], f"over_{other}", settings)
             rows.append(row)
@@ -92,12 +96,12 @@ def _nearer(gain: np.ndarray, name: str, settings: Mapping[str, Any]) -> dict[st
     return {f"gain_{name}": found.mean, f"low_{name}": found.low, f"high_{name}": found.high, f"verdict_{name}": word}
 
 
-def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any], force: float | str) -> np.ndarray:
-    """Errors over the readings (object,) of the gap formula at a force in N, or at all; nan without a valid load step.
+def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any], held: list[np.ndarray]) -> np.ndarray:
+    """Errors over the readings (object,) of the gap formula at the load steps that are `held`; nan without one.
 
-    The gain is fitted to the other objects, or to the object itself where no other has a valid load step.
+    The gain is fitted to the other objects, or to the object itself where no other has a load step.
     """
-    pairs = [_counts(spec, truth, press, force) for truth, press in zip(truths, presses, strict=True)]
+    pairs = [_counts(spec, *of) for of in zip(truths, presses, held, strict=True)]
     errors = np.full(len(pairs), np.nan)
     for k, (true, ideal) in enumerate(pairs):
         others = [pair for other, pair in enumerate(pairs) if other != k and len(pair[0])] or [(true, ideal)]
@@ -107,11 +111,20 @@ def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any], force: floa
     return errors
 
 
-def _counts(spec: SensorSpec, truth: Any, press: Any, force: float | str) -> tuple[np.ndarray, np.ndarray]:
-    """Ideal counts (n, row, column) of a truth and of a tested model at those of the truth's forces at which both hold."""
-    forces = press.normal_force_n.values
-    places = [int(np.argmin(np.abs(forces - force))) for force in truth.normal_force_n.values]
-    valid = (truth.within_validity.values == 1) & (press.within_validity.values[places] == 1)
-    valid &= np.isclose(truth.normal_force_n.values, force, rtol=1e-6) if force != "all" else True
-    return (ideal_of(spec, truth.deformation_map_mm.values[valid]),
-            ideal_of(spec, press.deformation_map_mm.values[places][valid]))
+def _held(truth: Any, presses: list[Any], force: float | str) -> np.ndarray:
+    """At which of a truth's load steps, at a force in N or all, it and all presses hold."""
+    held: np.ndarray = truth.within_validity.values == 1
+    for press in presses:
+        held = held & (press.within_validity.values[_steps_of(truth, press)] == 1)
+    return held if force == "all" else held & np.isclose(truth.normal_force_n.values, force, rtol=1e-6)
+
+
+def _steps_of(truth: Any, press: Any) -> list[int]:
+    """The load steps of a press at the forces of a truth."""
+    return [int(np.argmin(np.abs(press.normal_force_n.values - force))) for force in truth.normal_force_n.values]
+
+
+def _counts(spec: SensorSpec, truth: Any, press: Any, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ideal counts (n, row, column) of a truth and of a tested model at those of the truth's load steps that are `held`."""
+    return (ideal_of(spec, truth.deformation_map_mm.values[held]),
+            ideal_of(spec, press.deformation_map_mm.values[_steps_of(truth, press)][held]))
