@@ -76,6 +76,23 @@ def test_a_wall_that_slipped_between_the_points_before_edges_were_rounded_is_pre
     assert after.indentation_mm[1] == pytest.approx(at_once.indentation_mm[0], rel=0.02)
 
 
+def test_a_load_step_folded_between_the_points_is_kept_where_none_is_found_with_more_and_the_press_goes_on(monkeypatch):
+    def in_vain(*of, between=False):
+        if between:
+            body.resisting_folding(*of[2:0:-1], between=True)
+            raise ConvergenceError("no balance")
+        return reached(*of)
+
+    body, surface, settings, reached = small_body(), HeightField(resting_ball()), NewtonSettings.draft(), path._in_increments
+    start = body.resisting_folding(newton.first_touch(body, surface, settings), surface)
+    monkeypatch.setattr(LayeredBody, "folds_between", lambda self, state: self.slab.resists_folding == 1)
+    monkeypatch.setattr(path, "_in_increments", in_vain)
+    first = path._advance(body, surface, start, 0.0, path.ByForce(0.5, 0.02), settings)
+    assert first.force_n == 0.5 and body.slab.resists_folding == 1
+    assert path._advance(body, surface, first.state, 0.5, path.ByForce(1.0, 0.02), settings).force_n == 1.0
+    body.close()
+
+
 def test_an_element_folds_between_the_points_that_resist_only_where_it_could_have_more(monkeypatch):
     body = small_body()
     state = body.evaluate(*body.rest(), 0.0, far_above(body))

@@ -236,6 +236,11 @@ class LayeredBody:
             raise ConvergenceError("The cover is folded under an edge of the object; ask for load steps nearer to each other.")
         return resisting
 
+    def resist_folding_at_corners(self) -> None:
+        """Take back the points between, which `resisting_folding` has added."""
+        self.slab.resist_folding(1)
+        self._forget_factors()
+
     def evaluate(self, slab_displacement: np.ndarray, support_displacement: np.ndarray, indentation: float,
                  projection: ContactProjection, history: BodyHistory | None = None) -> BodyState | None:
         """State at given displacements, by default without a history of the contacts; None if an element is inverted."""

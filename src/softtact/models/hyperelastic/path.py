@@ -301,11 +301,20 @@ def _after(before: Control, step: MotionStep) -> Control:
 
 
 def _advance(body, surface, state, reached, stage, settings):
-    """Reach the stage's end; again, if its balance is folded between the points at which a cover resists folding, with more."""
+    """Reach the stage's end; again, if its balance is folded between the points at which a cover resists folding, with more.
+
+    If that finds no balance the folded one is kept, which is flagged, and the press goes on as before.
+    """
     load_step = _in_increments(body, surface, state, reached, stage, settings)
     if not body.folds_between(load_step.state):
         return load_step
-    again = _in_increments(body, surface, state, reached, stage, settings, between=True)
+    try:
+        again = _in_increments(body, surface, state, reached, stage, settings, between=True)
+    except TimeLimitError:
+        raise
+    except ConvergenceError:
+        body.resist_folding_at_corners()
+        return load_step
     return replace(again, iterations=load_step.iterations + again.iterations)
 
 

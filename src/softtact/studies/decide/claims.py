@@ -115,5 +115,6 @@ def _curve(curve, printed, statistics):
     network = "the printed network is trained, too" if printed else "the printed network is not trained here (learning.printed)"
     return row("The networks are trained on enough maps", "sec. 3.3.2", "13,000 maps",
                f"{flat} of {known} learning curves of the compact network are flat at their end; {network}",
-               REPRODUCED if enough else UNDECIDED, "at the rate of its last step, twice as many indenters change the error by less than 5 % of itself",
+               REPRODUCED if enough else UNDECIDED,
+               "at the rate of its last step, twice as many indenters change the error by less than 5 % of itself",
                "tables/learning_curve.csv", uncertainty="one seed")

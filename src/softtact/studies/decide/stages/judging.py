@@ -73,8 +73,9 @@ def baseline_of_readouts(scores: pd.DataFrame) -> pd.DataFrame:
 
 
 def with_flatness(curve: pd.DataFrame) -> pd.DataFrame:
-    """The rows with `last_fall`, the share by which the error falls for twice as many indenters, at the rate of the last step of its
-    curve, and whether its end is `flat`.
+    """The rows with `last_fall`, the share by which the error falls for twice as many indenters, and whether the curve is `flat`.
+
+    At the rate of the curve's last step.
     """
     falls = {}
     for key, own in curve.groupby(["truth", "model"], sort=False):
