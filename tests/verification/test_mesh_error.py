@@ -19,7 +19,7 @@ SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 3.6), "map_shape": (13, 13
 FINER = MeshSettings(refinement=1, frustum_heights=(0.0, 0.1, 0.3, 0.6, 1.0), cover_heights=(0.0, 0.25, 0.5, 0.75, 1.0),
                      cover_splits=(1, 4))
 LARGEST_PERCENT = {"fine": 2.0, "production": 5.1, "draft": 10.0}     # what the README promises, rounded
-SMALL_PUNCH_PERCENT = 3.0      # on the fine mesh, where a frustum is a quarter of the contact; the default has 3.5
+SMALL_PUNCH_PERCENT = 3.0      # on the fine mesh, where a frustum is a quarter of the contact; the default has 3.7
 
 
 def map_under_a_punch(mesh):
