@@ -33,13 +33,13 @@ KINDS = ("smooth", "stepped")
 
 
 def pressed(study, young_mpa, folder):
-    """Maps (item, force, y, x) and validity (item, force) of the elastic model with a modulus."""
+    """Maps (item, force, y, x) of the elastic model with a modulus, and where it has one (item, force)."""
     model = {"kind": "elastic", "plane": "surface", "young_mpa": young_mpa}
     sensor = sensor_of(found_sensor(study.values.sensor), model)
     presses = [press_item(sensor, model, folder / item.file if item.made else item.file, unit=item.unit,
                           forces_n=study.values.forces_n) for item in [*study.indenters, *study.objects]]
     return (np.array([press.deformation_map_mm.values for press in presses], dtype=np.float32),
-            np.array([press.within_validity.values == 1 for press in presses]))
+            np.array([np.isfinite(press.deformation_map_mm.values).all(axis=(1, 2)) for press in presses]))
 
 
 def scored(case, model, window):
@@ -84,11 +84,11 @@ def main(folder="results/decide"):
     sensor = found_sensor(study.values.sensor)
     printed = SensorSpec.from_yaml(sensor).elastic_layer.young_mpa
     files = {"maps": folder / "maps.nc", "sensor": sensor}
-    cases = [read_case(files | {"readings": folder / f"readings/{truth}.nc"}) for truth in study.values.truths]
+    cases = [read_case(files | {"readings": folder / f"readings/{truth}.nc"}, study.values.scored) for truth in study.values.truths]
     maps = {}
     for young in sorted({*MODULI_MPA, printed}):
         maps[young] = pressed(study, young, folder)
-        print(f"{young:g} MPa: {maps[young][1].mean():.0%} of the load steps are valid", flush=True)
+        print(f"{young:g} MPa: {maps[young][1].mean():.0%} of the load steps have a map", flush=True)
     rows = []
     for case in cases:
         for row in questions(case, maps, study):

@@ -16,13 +16,14 @@ from softtact.evaluation.decisions import NOT, REPRODUCED, UNDECIDED
 from softtact.files import write_dataset
 from softtact.geometry.generated import draw_objects
 from softtact.press.sensor import Sensor
+from softtact.studies.configuration import found_sensor
 from softtact.studies.decide.claims import claims_of_decision
 from softtact.studies.decide.config import COMPACT, MODELS, PRINTED, load_study, read_values
 from softtact.studies.decide.hypotheses import FAMILIES, Tables, hypothesis_table, shown_objects
 from softtact.studies.decide.jobs import jobs
 from softtact.studies.decide.policies import policy_scores
 from softtact.studies.decide.pressing import press_item, sensor_of
-from softtact.studies.decide.scoring import COLUMNS, SCORES, Case, fit_gain, mean_reading
+from softtact.studies.decide.scoring import COLUMNS, SCORES, Case, fit_gain, mean_reading, read_case
 from softtact.studies.decide.stages import presses as stages
 from softtact.studies.decide.stages.judging import baseline_of_readouts, state_power, with_flatness
 from softtact.studies.decide.stages.maps import map_robustness
@@ -47,7 +48,9 @@ def test_the_lower_feature_stands_back_by_the_stated_step(made):
 
 
 def test_every_training_of_the_printed_network_is_a_job_and_all_scores_are_gathered(tmp_path):
-    made = jobs(load_study(read_values("config/decide.yaml")), tmp_path)
+    values = read_values("config/decide.yaml")
+    values["learning"]["printed"]["seeds"] = 3
+    made = jobs(load_study(values), tmp_path)
     learned = [job for job in made if job.stage == "learn"]
     seeds = {name: sorted(seed for job in learned if job.settings["architecture"] == name and job.settings["truth"] == "a"
                           and job.settings["model"] == "elastic" for seed in job.settings["seeds"]) for name in (COMPACT, PRINTED)}
@@ -101,6 +104,24 @@ def test_the_mean_reading_stands_beside_every_readout_of_its_truth():
                           columns=["truth", "model", "readout", "error_share"])
     found = baseline_of_readouts(scores)[["truth", "readout", "error_share"]].values.tolist()
     assert found == [["a", "gap", 0.8], ["a", "compact", 0.8], ["b", "gap", 0.7]]
+
+
+@pytest.mark.parametrize(("scored", "expected"), [("truth", [True, True, False, False]), ("all", [True, False, False, False])])
+def test_a_load_step_counts_where_the_truth_holds_and_all_models_have_a_map(tmp_path, scored, expected):
+    """At 2 N the foundation model flags its map, at 3 N the elastic layer has none, at 4 N the truth does not hold."""
+    models, forces = [*MODELS, "a"], [1.0, 2.0, 3.0, 4.0]
+    maps, valid = np.zeros((len(models), 1, 4, 33, 57), np.float32), np.ones((len(models), 1, 4), np.int8)
+    valid[models.index("foundation"), 0, 1] = valid[models.index("a"), 0, 3] = 0
+    maps[models.index("elastic"), 0, 2] = np.nan
+    axes = ("model", "item", "force")
+    files = {"maps": xarray.Dataset({"deformation_map_mm": ((*axes, "y", "x"), maps), "valid": (axes, valid)},
+                                    coords={"model": models, "item": ["ball"], "set": ("item", ["smooth"])}),
+             "readings": xarray.Dataset({"tactile_map": (("item", "force", "row", "column"), np.zeros((1, 4, 7, 4)))},
+                                        coords={"force_n": ("force", forces)}, attrs={"truth": "a", "model": "a"})}
+    for name, data in files.items():
+        write_dataset(tmp_path / f"{name}.nc", data, seed=None, settings={})
+    case = read_case({name: tmp_path / f"{name}.nc" for name in files} | {"sensor": found_sensor("coro")}, scored)
+    assert case.valid.tolist() == [expected]
 
 
 def simulated(gain, *, objects=12, scatter=0.01, seed=0):
@@ -187,7 +208,9 @@ def test_a_test_that_holds_alone_may_be_undecided_beside_the_others_of_its_claim
 
 def test_the_stated_power_is_that_of_each_readouts_trainings_and_of_the_distance_that_its_test_has(tmp_path):
     """A hybrid as good as the hyperelastic model is by the margin above the bound; five seeds tell more than three."""
-    made = next(job for job in jobs(load_study(read_values("config/decide.yaml")), tmp_path) if job.stage == "state_power")
+    values = read_values("config/decide.yaml")
+    values["learning"]["printed"]["seeds"] = 3
+    made = next(job for job in jobs(load_study(values), tmp_path) if job.stage == "state_power")
     state_power(inputs={}, outputs={"power": tmp_path / "power.csv"}, settings=made.settings)
     table = pd.read_csv(tmp_path / "power.csv").set_index(["claim", "readout"])
     assert table.loc["balance"].effect.unique() == [STATISTICS["margin"]] and table.loc["detail"].effect.unique() == [0.03]
@@ -226,7 +249,7 @@ def bump(x_mm, width_mm):
     return 0.1 * np.exp(-((x - x_mm)**2 + y**2) / width_mm**2)
 
 
-def map_of(tmp_path, maps, forces_n, *, invalid=()):
+def map_of(tmp_path, maps, forces_n, *, invalid=(), scored="truth"):
     """Rows of the map of robustness of one truth; maps: {input: maps (step, y, x) of each object};  invalid: inputs' last steps."""
     paths = {name: [tmp_path / f"{name}_{number}.nc" for number in range(len(each))] for name, each in maps.items()}
     for name, each in maps.items():
@@ -237,7 +260,7 @@ def map_of(tmp_path, maps, forces_n, *, invalid=()):
             write_dataset(path, data, seed=None, settings={})
     map_robustness(inputs=paths | {"sensor": SMALL}, outputs={"robustness": tmp_path / "robustness.csv"},
                    settings={"variants": [{"law": "made_up"}], "objects": list(range(len(paths["variants"]))), "forces_n": forces_n,
-                             "seed": 0, "statistics": STATISTICS})
+                             "seed": 0, "statistics": STATISTICS, "scored": scored})
     return pd.read_csv(tmp_path / "robustness.csv")
 
 
@@ -260,14 +283,17 @@ def test_a_layer_right_at_each_force_but_for_a_factor_is_wrong_at_all_together_i
     np.testing.assert_allclose(table.error_hyperelastic, 0.0, atol=1e-9)
 
 
-def test_all_models_of_the_map_of_robustness_are_scored_at_the_load_steps_at_which_each_of_them_holds(tmp_path):
-    """Where the elastic layer is too deep at 2 N, the others' errors at 2 N do not count either."""
+@pytest.mark.parametrize(("scored", "invalid", "count"), [("all", "presses_elastic", 0), ("truth", "presses_elastic", 3),
+                                                          ("truth", "variants", 0)])
+def test_all_models_of_the_map_of_robustness_are_scored_at_the_same_load_steps(tmp_path, scored, invalid, count):
+    """What the truth flags at 2 N does not count; where the elastic layer does, all count or none does, as the study asks."""
     names = ("variants", "presses_hyperelastic", "presses_elastic", "presses_matched")
     maps = {name: [[bump(place, 2.0), (1.0 + 0.5 * number) * bump(place, 2.0)] for place in (-2.0, 0.0, 2.0)]
             for number, name in enumerate(names)}
-    table = map_of(tmp_path, maps, [1.0, 2.0], invalid=["presses_elastic"]).set_index("force_n")
-    assert table.objects.to_dict() == {"all": 3, "1": 3, "2": 0}
-    assert table.filter(like="error_").loc["all"].to_numpy() == pytest.approx(0.0, abs=1e-9)
+    table = map_of(tmp_path, maps, [1.0, 2.0], invalid=[invalid], scored=scored).set_index("force_n")
+    assert table.objects.to_dict() == {"all": 3, "1": 3, "2": count}
+    errors = table.filter(like="error_").loc["all"].to_numpy()
+    assert (errors == pytest.approx(0.0, abs=1e-9)) == (count == 0)
 
 
 def test_an_elastic_layer_twice_as_stiff_needs_twice_the_force_for_the_same_map(tmp_path):

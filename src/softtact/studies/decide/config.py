@@ -133,6 +133,8 @@ class DecideValues(Section):
     rule: dict[Literal["total", "overlap"], PositiveFloat] = Field(
         description="thresholds of the paper's rule, either of which asks for the hyperelastic model")
     tolerance_mm: Annotated[PositiveFloat, BeforeValidator(plain_value)] = Field(description="of the policy by expected error")
+    scored: Literal["truth", "all"] = Field(
+        description="at which load steps models are scored: where the truth holds, or where all tested models do, too")
     ssim_window: PositiveInt = Field(description="of both SSIMs, in taxels")
     learning: Learning
     statistics: Statistics

@@ -162,7 +162,7 @@ class _Jobs:
         plan = self.values.learning
         settings = {"architecture": architecture, "seed": self.values.seed, "device": plan.device,
                     "validation_share": plan.validation_share, "ssim_window": self.values.ssim_window,
-                    "trained": trained.model_dump(mode="json", exclude={"seeds"})}
+                    "scored": self.values.scored, "trained": trained.model_dump(mode="json", exclude={"seeds"})}
         return settings, {f"{architecture}_maps": len(self.study.indenters) * len(self.forces) * trained.epochs * times}
 
     def judging(self) -> list[Job]:
@@ -172,8 +172,8 @@ class _Jobs:
         common = {"seed": values.seed, "ssim_window": values.ssim_window}
         table = {name: f"{folder}/tables/{name}.csv" for name in (*TABLES, "claims")}
         learned = self.learning()
-        scored = [Job("score_formulas", self.maps(truth), {"scores": f"{folder}/scores/{{truth}}.csv"}, common | {"truth": truth},
-                      {"truth": truth}) for truth in self.study.truths]
+        scored = [Job("score_formulas", self.maps(truth), {"scores": f"{folder}/scores/{{truth}}.csv"},
+                      common | {"truth": truth, "scored": values.scored}, {"truth": truth}) for truth in self.study.truths]
         power = Job("state_power", {}, {"power": table["power"]},
                     {"statistics": statistics, **values.objects.model_dump(include={"smooth", "stepped"}),
                      "seeds": self._seeds(), "tests": self._tests()})
@@ -223,7 +223,7 @@ class _Jobs:
                                       **self.sensor},
                    {"robustness": table},
                    {"variants": [varied for _, varied, _ in variants], "objects": [item.id for item in few],
-                    "forces_n": list(self.values.robustness.forces_n), "seed": self.values.seed,
+                    "forces_n": list(self.values.robustness.forces_n), "seed": self.values.seed, "scored": self.values.scored,
                     "statistics": self.values.statistics.model_dump(mode="json")})
 
     def figures(self) -> list[Job]:

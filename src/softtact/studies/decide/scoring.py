@@ -1,7 +1,8 @@
 """What a readout gives for a model's maps, scored against a truth's readings, object by object.
 
-Trained is on the indenters, scored on the objects; a load step counts where truth and all tested models hold, so that all
-are scored on the same maps.
+Trained is on the indenters, scored on the objects, all models on the same load steps: those at which the truth holds and every
+model has a map. What a model flags itself takes nothing out, for what it gives there is what is tested; the configuration may ask
+for the load steps at which all models hold.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,7 +46,7 @@ class Case:
     maps_mm: dict[str, np.ndarray]
     """{model: (item, force, y, x)}."""
     valid: np.ndarray
-    """(item, force): where the truth and all models hold."""
+    """(item, force): where load steps count."""
 
     def samples(self, model: str, chosen: Sequence[str], split: str) -> Samples:
         """The valid load steps of some items, as `learning` takes them."""
@@ -72,14 +73,19 @@ class Case:
         return self.of_sets("smooth", "stepped")
 
 
-def read_case(inputs: Mapping[str, Any]) -> Case:
-    """The `Case` of a stage's inputs: readings (of `read_truth`), maps (of `gather_maps`), sensor."""
+def read_case(inputs: Mapping[str, Any], scored: str) -> Case:
+    """The `Case` of a stage's inputs: readings (of `read_truth`), maps (of `gather_maps`), sensor.
+
+    scored: at which load steps, as in the configuration
+    """
     readings, maps = read_dataset(inputs["readings"]), read_dataset(inputs["maps"])
-    valid = maps.valid.sel(model=[*MODELS, readings.attrs["model"]]).values.astype(bool).all(axis=0)
+    of_models = {model: maps.deformation_map_mm.sel(model=model).values for model in MODELS}
+    holding = [*(MODELS if scored == "all" else ()), readings.attrs["model"]]
+    counts = maps.valid.sel(model=holding).values.astype(bool).all(axis=0)
+    for values in (readings.tactile_map.values, *of_models.values()):
+        counts = counts & np.isfinite(values).all(axis=(2, 3))
     return Case(SensorSpec.from_yaml(inputs["sensor"]), readings.attrs["truth"], [str(name) for name in maps.item.values],
-                [str(name) for name in maps["set"].values], readings.force_n.values, readings.tactile_map.values,
-                {model: maps.deformation_map_mm.sel(model=model).values for model in MODELS},
-                valid & np.isfinite(readings.tactile_map.values).all(axis=(2, 3)))
+                [str(name) for name in maps["set"].values], readings.force_n.values, readings.tactile_map.values, of_models, counts)
 
 
 def fit_gain(ideal: np.ndarray, counts: np.ndarray) -> float:

@@ -30,9 +30,9 @@ def score_formulas(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     """Score the gap formula with one gain and the quadratic, for all tested models against one truth, and the mean reading.
 
     inputs: readings, maps, sensor;  outputs: scores (CSV)
-    settings: truth, seed, ssim_window
+    settings: truth, seed, ssim_window, scored
     """
-    case = read_case(inputs)
+    case = read_case(inputs, settings["scored"])
     predicted = [(model, *one) for model in MODELS for one in formula_predictions(case, model)]
     predicted += [(MEAN_READING, NO_READOUT, *mean_reading(case))]
     frames = [object_scores(samples, counts, window=settings["ssim_window"], data_range=case.spec.largest_counts,
@@ -46,9 +46,9 @@ def learn(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
 
     inputs: as of `score_formulas`;  outputs: scores (CSV)
     settings: truth, model, architecture, trained (values of `config.Trainings` without seeds), seeds, validation_share, device,
-        seed, ssim_window
+        seed, ssim_window, scored
     """
-    work = _Work(read_case(inputs), settings, threads)
+    work = _Work(read_case(inputs, settings["scored"]), settings, threads)
     write_csv(outputs["scores"], pd.concat([work.trained(work.training, seed)[0] for seed in settings["seeds"]])[COLUMNS])
 
 
@@ -58,7 +58,7 @@ def trace_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     inputs: as of `score_formulas`;  outputs: curve (CSV: CURVE_COLUMNS)
     settings: as of `learn`, with shares in place of seeds
     """
-    work = _Work(read_case(inputs), settings, threads)
+    work = _Work(read_case(inputs, settings["scored"]), settings, threads)
     write_csv(outputs["curve"], pd.DataFrame(list(work.curve()), columns=CURVE_COLUMNS))
 
 

@@ -1,6 +1,6 @@
 """The collapse of the lower feature's share, and the map of robustness."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -60,12 +60,11 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
     inputs: variants (presses, the objects of one variant after those of the other), presses_elastic, presses_matched,
     presses_hyperelastic (lists, of the objects), sensor;  outputs: robustness (CSV)
-    settings: variants [{law, bulk_over_shear, tips_bonded, mesh}, ...], objects, forces_n, seed, statistics
+    settings: variants [{law, bulk_over_shear, tips_bonded, mesh}, ...], objects, forces_n, seed, statistics, scored
     A row for all forces (force_n: all), whose one gain fits no linear layer to a sensor that stiffens, and one for each force.
     Read by the gap formula, whose one gain is fitted to the other objects, and of a single object to itself. With fewer objects
     than the statistics ask for every verdict is undecided: means and intervals then orient, they test nothing.
-    Counted are load steps at which the truth and all tested models hold, so that all are scored on the same maps; `objects` is how
-    many have one.
+    All models are scored on the same load steps (`scoring`); `objects` is how many have one.
     """
     spec, count = SensorSpec.from_yaml(inputs["sensor"]), len(settings["objects"])
     tested = {model: [read_dataset(path) for path in inputs[f"presses_{model}"]] for model in (ELASTIC, MATCHED, HYPERELASTIC)}
@@ -73,7 +72,7 @@ def map_robustness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     for number, varied in enumerate(settings["variants"]):
         truths = [read_dataset(path) for path in inputs["variants"][number * count:(number + 1) * count]]
         for force in ["all", *(settings["forces_n"] if len(settings["forces_n"]) > 1 else [])]:
-            held = [_held(truth, presses, force) for truth, *presses in zip(truths, *tested.values(), strict=True)]
+            held = [_held(*of, force, settings["scored"]) for of in zip(truths, zip(*tested.values(), strict=True), strict=True)]
             errors = {model: _errors(spec, truths, presses, held) for model, presses in tested.items()}
             row = varied | {"force_n": force if force == "all" else f"{force:g}", "objects": sum(one.any() for one in held)}
             row |= {f"error_{model}": values[np.isfinite(values)].mean() if np.isfinite(values).any() else np.nan
@@ -111,11 +110,13 @@ def _errors(spec: SensorSpec, truths: list[Any], presses: list[Any], held: list[
     return errors
 
 
-def _held(truth: Any, presses: list[Any], force: float | str) -> np.ndarray:
-    """At which of a truth's load steps, at a force in N or all, it and all presses hold."""
+def _held(truth: Any, presses: Iterable[Any], force: float | str, scored: str) -> np.ndarray:
+    """Which of a truth's load steps, at a force in N or all, count."""
     held: np.ndarray = truth.within_validity.values == 1
     for press in presses:
-        held = held & (press.within_validity.values[_steps_of(truth, press)] == 1)
+        steps = _steps_of(truth, press)
+        held = held & np.isfinite(press.deformation_map_mm.values[steps]).all(axis=(1, 2))
+        held = held & ((press.within_validity.values[steps] == 1) | (scored != "all"))
     return held if force == "all" else held & np.isclose(truth.normal_force_n.values, force, rtol=1e-6)
 
 
