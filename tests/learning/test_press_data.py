@@ -12,6 +12,8 @@ import pytest
 import torch
 import trimesh
 import xarray
+from support.sensors import zeroed_at
+from support.small_sensors import small_block
 
 import softtact
 from softtact import files
@@ -183,6 +185,20 @@ def test_from_behind_the_upper_side_touches_and_x_turns_round(meshes):
     turned = behind(meshes["box"], Pose.from_values([2, 1, 2.5, 0, 0, 0]))
     corners = turned.apply(meshes["box"].vertices)
     assert corners[:, 2].min() == pytest.approx(0, abs=1e-12) and corners[:, :2].mean(axis=0) == pytest.approx([-2, 1])
+
+
+def test_counts_below_the_baseline_of_a_calibrated_sensor_are_written_as_zero(sensor, meshes, tmp_path):
+    known = replace(sensor, spec=zeroed_at(sensor.spec, -3.0))
+    write_press_data(tmp_path / "z.h5", plan(known, meshes, presses=1), workers=1, label="")
+    found = arrays(tmp_path / "z.h5")["tactile_map"]
+    assert found.min() == 0 and 10 < found.max() <= sensor.spec.largest_counts
+
+
+def test_a_sensor_whose_counts_a_data_set_does_not_hold_is_refused_before_a_press(sensor, meshes, tmp_path):
+    with pytest.raises(InputError, match="coro: its largest_counts, 100000, are more than the 65535 that 16 bits hold"):
+        plan(replace(sensor, spec=sensor.spec.model_copy(update={"largest_counts": 1e5})), meshes)
+    with pytest.raises(InputError, match="block"):
+        plan(softtact.load_sensor(small_block(tmp_path)), meshes)
 
 
 def test_a_press_that_fails_is_marked_and_the_others_stand(sensor, meshes, tmp_path, monkeypatch):

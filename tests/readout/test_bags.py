@@ -34,6 +34,14 @@ def test_forces_of_each_finger_have_a_topic_each(tmp_path, press):
     assert again.force_n.values == pytest.approx(press.force_n.values)
 
 
+@pytest.mark.parametrize("base", [-3.0, 0.5])
+def test_counts_over_a_baseline_that_the_driver_s_message_does_not_hold_are_kept_as_an_array(tmp_path, press, base):
+    press = press.assign(baseline=press.baseline * 0 + base, counts=press.counts - press.counts.min() + 5 - base)
+    write_bag(tmp_path / "r.mcap", press)
+    again = read_bag(tmp_path / "r.mcap", baseline="subtracted")
+    assert again.counts.values == pytest.approx(press.counts.values)
+
+
 def test_counts_that_are_not_whole_are_kept_as_an_array(tmp_path, press):
     press = press.assign(counts=press.counts + 0.5)
     write_bag(tmp_path / "r.mcap", press)

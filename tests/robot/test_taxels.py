@@ -1,10 +1,14 @@
 """Readings from memory: as of a press at that very place and force, and the same whatever was asked for before."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
+from support.sensors import CORO, zeroed_at
 
+from softtact.errors import InputError
 from softtact.geometry.pose import Pose
 from softtact.press.sensor import load_sensor
 from softtact.robot.events import pose_of, set_down
@@ -95,6 +99,20 @@ def test_the_expected_error_of_a_reading_is_that_of_its_press():
 def test_an_object_beside_the_sensor_is_not_felt():
     memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
     assert memory.counts(0, np.array([30.0, 0, 0, 1, 0, 0, 0]), 5.0).max() < 1e-9
+
+
+def test_counts_of_a_calibrated_sensor_below_its_baseline_are_read_as_zero():
+    sensor = load_sensor("coro")
+    memory = TaxelMemory(replace(sensor, spec=zeroed_at(sensor.spec, -3.0)), CYLINDER, "elastic", LARGEST_N)
+    poses, forces = np.tile([0.0, 0, 0, 1, 0, 0, 0], (2, 1, 1)), np.array([[[0.0, 0, 0]], [[0, 0, -10.0]]])
+    free, pressed = memory.observe_many(poses, forces)[0]["tactile"]
+    assert (free == 0).all() and 100 < pressed.max() < 2400 and pressed.min() == 0
+
+
+def test_a_sensor_whose_counts_16_bits_do_not_hold_is_refused():
+    wide = replace(load_sensor("coro"), spec=CORO.model_copy(update={"largest_counts": 1e5}))
+    with pytest.raises(InputError, match="coro: its largest_counts, 100000, are more than the 65535 that 16 bits hold"):
+        TaxelMemory(wide, CYLINDER, "elastic", LARGEST_N)
 
 
 def test_a_map_that_is_carried_over_the_side_keeps_its_volume():

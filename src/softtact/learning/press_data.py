@@ -37,6 +37,7 @@ from softtact.learning.lerobot import FPS, same_as, write_lerobot
 from softtact.learning.press_blocks import BLOCK, PressBlocks
 from softtact.outputs import held, not_written, target_of
 from softtact.progress import progress
+from softtact.readout.taxels import need_whole_counts, whole_counts
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -66,6 +67,9 @@ class PressPlan:
 
     def __post_init__(self) -> None:
         self.sensor.checked_forces(self.forces_n)
+        self.sensor.spec.need_layers()
+        self.sensor.spec.need_taxels("a data set of presses")
+        need_whole_counts(self.sensor.spec, "a data set of presses")
         if self.presses < 1:
             raise InputError(f"A data set of {self.presses} presses is empty; give 1 or more.")
 
@@ -172,7 +176,7 @@ def _arrays(plan: PressPlan, results: Sequence[Sequence[Any]]) -> dict[str, np.n
             continue
         for name in ("deformation_map_mm", "indentation_mm", "within_validity"):
             arrays[name][number] = np.stack([getattr(one, name) for one in of_fingers], axis=1)
-        arrays["tactile_map"][number] = np.round(np.stack([one.tactile_map for one in of_fingers], axis=1))
+        arrays["tactile_map"][number] = whole_counts(np.stack([one.tactile_map for one in of_fingers], axis=1))
         arrays["status"][number] = DONE
     return arrays
 

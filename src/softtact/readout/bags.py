@@ -265,7 +265,7 @@ def _write_messages(writer, recording):
     stamps = np.round(1e6 * recording.attrs["start_ms"] + 1e9 * recording.time.values).astype(np.int64)
     counts, base = recording.counts.values, recording.baseline.values
     raw = counts + base
-    driver = counts.shape[1] == 2 and (raw == np.round(raw)).all() and raw.min() >= 0 and raw.max() <= LARGEST_RAW
+    driver = counts.shape[1] == 2 and _of_16_bits(raw) and _of_16_bits(base)
     of_taxels = _static_data(store) if driver else _array(store)
     messages = [(TAXEL_TOPIC, stamp, of_taxels(frame)) for stamp, frame in zip(stamps, raw if driver else counts, strict=True)]
     if driver:
@@ -278,6 +278,11 @@ def _write_messages(writer, recording):
         if topic not in connections:
             connections[topic] = writer.add_connection(topic, kind, typestore=store)
         writer.write(connections[topic], int(stamp), store.serialize_cdr(message, kind))
+
+
+def _of_16_bits(raw):
+    """Whether raw counts are whole numbers that the driver's message holds."""
+    return (raw == np.round(raw)).all() and raw.min() >= 0 and raw.max() <= LARGEST_RAW
 
 
 def _static_data(store):

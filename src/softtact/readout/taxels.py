@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from softtact.sensors.specification import AnySpec
 
+LARGEST_WHOLE = np.iinfo(np.uint16).max     # of a converter of 16 bits
+
 
 @register("capacitance")
 class Capacitance(FiniteSection):
@@ -54,3 +56,15 @@ def counts_of(spec: "AnySpec", displacement_mm: np.ndarray) -> np.ndarray:
         return ideal_counts(spec, displacement_mm)
     change = known.counts_per_relative_change * relative_change(spec, displacement_mm)
     return np.minimum(amplified(change, gain=np.array(known.gain), offset=np.array(known.zero_counts)), spec.largest_counts)
+
+
+def whole_counts(counts: np.ndarray) -> np.ndarray:
+    """Counts as a converter gives them: whole, from 0 to `LARGEST_WHOLE`, uint16. Those of a calibrated sensor may be below 0."""
+    return np.clip(np.round(counts), 0, LARGEST_WHOLE).astype(np.uint16)
+
+
+def need_whole_counts(spec: "AnySpec", what: str) -> None:
+    """Raise InputError for a sensor whose range `whole_counts` would cut off; `what` holds such counts."""
+    if spec.largest_counts > LARGEST_WHOLE:
+        raise InputError(f"{spec.name}: its largest_counts, {spec.largest_counts:g}, are more than the {LARGEST_WHOLE} that 16 "
+                         f"bits hold, in which {what} keeps counts; state at most {LARGEST_WHOLE} in its file.")

@@ -32,7 +32,7 @@ from softtact.press.fast import press_underside, thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.sensor import Sensor
 from softtact.press.task import cores
-from softtact.readout.taxels import counts_of
+from softtact.readout.taxels import counts_of, need_whole_counts, whole_counts
 from softtact.robot.events import FINGERS, set_down
 
 # The mesh in each finger's frame: the right finger is behind it, and rotations about z change their sign.
@@ -74,6 +74,7 @@ class TaxelMemory:
 
     def __post_init__(self) -> None:
         self.sensor.spec.need_taxels("the environment")
+        need_whole_counts(self.sensor.spec, "the environment")
         self.device = find_device(self.device)
         if self.device != "cpu" and not (self.model == "elastic" and together(self.sensor)):
             raise InputError(f"device={self.device!r}: only the elastic model presses places on a GPU, on sensors whose lower side "
@@ -113,7 +114,7 @@ class TaxelMemory:
         count, fingers = forces.shape[:2]
         counts, errors = self._read(np.tile(np.arange(fingers), count), poses.reshape(-1, 7), -forces[..., 2].ravel())
         shape = count, fingers
-        return {"tactile": np.round(counts).astype(np.uint16).reshape(*shape, *counts.shape[1:])}, errors.reshape(shape)
+        return {"tactile": whole_counts(counts).reshape(*shape, *counts.shape[1:])}, errors.reshape(shape)
 
     def facts(self) -> dict[str, Any]:
         """What an environment tells beside the readings: expected errors (finger,) of the last maps in mm, number of places."""
