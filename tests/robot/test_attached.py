@@ -169,6 +169,45 @@ def test_a_depth_is_read_as_the_press_that_is_as_deep(coro):
     assert exact.indentation_mm[0] == pytest.approx(0.1, rel=0.01) and -reading.force_n[2] > 0.1
 
 
+def read_at(coro, objects, height_mm):
+    """The reading from the pose of the only object, at a height of its middle over the sensing surface."""
+    model = mujoco.MjModel.from_xml_string(scene(objects, collides=NO_CONTACT))
+    data = mujoco.MjData(model)
+    data.qpos[:3] = [0.0, 0.0, 1e-3 * height_mm]
+    mujoco.mj_forward(model, data)
+    return attach(model, "plate", coro, source="poses").read(data)
+
+
+@pytest.mark.parametrize(("objects", "name", "height_mm"), [(box(), "box", 7.4), (box(), "box", 0.0), (BALL, "ball", 2.0),
+                                                            (BALL, "ball", -2.4)])
+def test_an_object_driven_deeper_than_the_sensor_is_thick_reads_the_largest_force_and_says_so(coro, objects, name, height_mm):
+    reading = read_at(coro, objects, height_mm)
+    assert -reading.force_n[2] == pytest.approx(50.0, rel=1e-3) and reading.deformation_map_mm.max() > 0.5
+    assert f"{name}: the force is above 50 N, the sensor's limit" in reading.validity_reason
+
+
+def test_a_depth_that_the_largest_force_does_not_reach_says_so(coro):
+    assert read_at(coro, box(), 8.8).validity_reason == "box: the force is above 50 N, the sensor's limit"
+    assert not read_at(coro, box(), 9.5).validity_reason     # 0.5 mm: 38 N
+
+
+def test_an_object_beneath_the_board_does_not_touch(coro):
+    reading = read_at(coro, box(), -2.6)     # the board is at -2.5 mm
+    assert not reading.objects and not reading.force_n.any() and not reading.validity_reason
+
+
+def test_a_box_that_one_step_drives_through_the_sensor_comes_back_up(coro):
+    model = mujoco.MjModel.from_xml_string(scene(box(0.5), collides=NO_CONTACT))
+    sensor = attach(model, "plate", coro, source="poses")
+    data = mujoco.MjData(model)
+    data.qvel[2], lowest = -2.0, []     # m/s: 4 mm in a step
+    for _ in range(100):
+        hand_back(data, [sensor])
+        mujoco.mj_step(model, data)
+        lowest.append(1e3 * data.qpos[2] - 10.0)
+    assert min(lowest) < -2.5 and lowest[-1] == pytest.approx(-0.065, abs=0.01)     # its weight sinks in by 0.065 mm
+
+
 def grip(coro, shape, size, turn="", *, seconds=0.3, **options):
     spec = mujoco.MjSpec.from_string(HAND.format(type=shape, size=size, turn=turn))
     sensors = [attach(spec, finger, coro, pose=pose, **options) for finger, pose in (("left", LEFT), ("right", RIGHT))]

@@ -39,6 +39,7 @@ from softtact.robot.settings import number
 SOURCES = ("contacts", "poses")
 _RIM_MM, _OVER_MM = 0.5, 1.0      # beside the footprint and over the surface, within which a contact is on the sensor
 _LEAST_N, _LEAST_MM = 1e-3, 1e-6     # force and depth below which nothing is pressed
+_REACHED = 0.99                      # share of a depth from which on a press has reached it, within the search of its force
 _STILL_MM, _STILL_N = 1e-5, 1e-6     # change of a pose (mm, and as a share of a turn) and share of a force: the same press
 # Heights over the surface, in thicknesses, and the share of places there in the body, from which its frame points into the body.
 _OVER, _WITHIN = (0.5, 1.0, 2.0), 0.5
@@ -131,9 +132,9 @@ class AttachedSensor:
         """
         self._bind(data)
         if self.source == "poses":
-            pressed = {body: self._last_depth(data, body) for body in self.touching(data)}
-            forces = {body: np.array([0.0, 0.0, -result.normal_force_n[0]]) for body, result in pressed.items()}
-            return self._reading(forces, {body: (result, "") for body, result in pressed.items()})
+            pressed = {body: self._to_depth(data, body, depth) for body, depth in self.touching(data).items()}
+            forces = {body: np.array([0.0, 0.0, -result.normal_force_n[0]]) for body, (result, _) in pressed.items()}
+            return self._reading(forces, pressed)
         forces = self.contact_forces(data)
         if has_gel(self.sensor):
             return self._gel_reading(data, forces)
@@ -157,7 +158,7 @@ class AttachedSensor:
     def touching(self, data: Any) -> dict[int, float]:
         """{body: depth in mm below the sensing surface} of the objects that are in it, by their poses.
 
-        An object whose lowest point over the sensor is below the board lies beneath the sensor and does not touch.
+        One that reaches below the board is driven in where its middle is above the board, else it lies beneath and does not touch.
         """
         origin, turn = self.pose(data)
         half = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
@@ -166,9 +167,10 @@ class AttachedSensor:
             centre = turn.inv().apply(data.xpos[body] / MM - origin)
             if (np.abs(centre) > [*half, 0.0] + self._reach[body]).any():
                 continue
-            depth = -first_touch_mm(self.sensor, self.underside(data, body))
-            if _LEAST_MM < depth <= self.sensor.spec.thickness_mm:
-                depths[body] = depth
+            placed = self._placed(data, body)
+            lowest, middle = first_touch_mm(self.sensor, HeightField(placed)), placed.bounds[:, 2].mean()
+            if lowest < -_LEAST_MM and max(lowest, middle) >= -self.sensor.spec.thickness_mm:
+                depths[body] = -lowest
         return depths
 
     def pose(self, data: Any) -> tuple[np.ndarray, Rotation]:
@@ -187,12 +189,15 @@ class AttachedSensor:
 
     def underside(self, data: Any, body: int) -> HeightField:
         """The underside of an object in its place over the sensor."""
-        return HeightField(place(self._mesh(body), pose=self.object_pose(data, body)))
+        return HeightField(self._placed(data, body))
+
+    def _placed(self, data, body):
+        return place(self._mesh(body), pose=self.object_pose(data, body))
 
     def press_depth(self, data: Any, body: int, depth_mm: float, guess_n: float) -> DepthPress:
-        """The press of an object to its depth in the scene."""
+        """The press of an object to its depth in the scene, at most as deep as the sensor is thick."""
         surface = self.underside(data, body).moved(np.array([0.0, 0.0, depth_mm]))
-        return press_to_depth(self.sensor, surface, depth_mm, guess_n=guess_n)
+        return press_to_depth(self.sensor, surface, min(depth_mm, self.sensor.spec.thickness_mm), guess_n=guess_n)
 
     def body_number(self, data: Any) -> int:
         """Of the sensor's body."""
@@ -243,7 +248,7 @@ class AttachedSensor:
     def _pressed(self, data, body, force_n):
         """(`PressResult` or None, why it is not valid) of an object under a normal force."""
         most = self.sensor.spec.force_range_n[1]
-        over = "" if force_n <= most else f"the force is above {most:g} N, the sensor's limit"
+        over = "" if force_n <= most else self._over
         pose, force_n = self.object_pose(data, body), min(force_n, most)
         state = np.array([*pose.translation_mm, *pose.rotation.as_quat(canonical=True), force_n])
         if body not in self._last or _moved(self._last[body][0], state):
@@ -256,12 +261,16 @@ class AttachedSensor:
             self._last[body] = state, with_expected_error(self.sensor, result)
         return self._last[body][1], over
 
-    def _last_depth(self, data, body):
-        """The result of an object at its depth, whose force before is the guess."""
+    @property
+    def _over(self):
+        return f"the force is above {self.sensor.spec.force_range_n[1]:g} N, the sensor's limit"
+
+    def _to_depth(self, data, body, depth_mm):
+        """(`PressResult`, why it is not valid) of an object at its depth; its force before is the guess."""
         guess = float(self._last[body][1].normal_force_n[0]) if body in self._last else 0.1 * self.sensor.spec.force_range_n[1]
-        result = with_expected_error(self.sensor, self.press_depth(data, body, self.touching(data)[body], guess).result)
+        result = with_expected_error(self.sensor, self.press_depth(data, body, depth_mm, guess).result)
         self._last[body] = np.zeros(0), result
-        return result
+        return result, "" if result.indentation_mm[0] >= _REACHED * depth_mm else self._over
 
     def _reading(self, forces, pressed):
         """The sum of the presses of several objects."""
