@@ -1,5 +1,8 @@
 """Sensors on bodies of anyone's MuJoCo scene: a known weight is read, from the engine's forces and from its poses."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -275,6 +278,45 @@ def test_a_scene_that_begins_again_forgets_its_contacts(coro):
     model = spec.compile()
     runs = [settled(model, 0.03, [sensor]).qpos.copy() for _ in range(2)]
     assert (runs[0] == runs[1]).all()
+
+
+def aside(model, height_mm, x_mm):
+    """A state with the only object at a height of its middle and a place along x."""
+    data = mujoco.MjData(model)
+    data.qpos[:3] = [1e-3 * x_mm, 0.0, 1e-3 * height_mm]
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def test_two_states_of_a_scene_that_run_beside_each_other_have_contacts_of_their_own(coro):
+    model = mujoco.MjModel.from_xml_string(scene(box(0.5), collides=NO_CONTACT))
+    both, alone = (attach(model, "plate", coro, source="poses", friction=0.5) for _ in range(2))
+    one, other, same = (aside(model, 9.9, x) for x in (0.0, 1.0, 1.0))
+    pushed = []
+    for _ in range(3):
+        for data, sensor in ((one, both), (other, both), (same, alone)):
+            pushed.append(hand_back(data, [sensor])["box"])
+            mujoco.mj_step(model, data)
+    assert np.abs(pushed[1][:2]).max() < 0.01 * pushed[1][2]     # not sheared by the 1 mm between both
+    assert (np.array(pushed[1::3]) == pushed[2::3]).all() and (other.qpos == same.qpos).all()
+
+
+def test_a_gel_follows_the_object_of_each_state_alone(tmp_path):
+    (tmp_path / "gel.yaml").write_text(SMALL_GEL)
+    spec = mujoco.MjSpec.from_string(scene(box(0.2)))
+    both, alone = (attach(spec, "plate", softtact.load_sensor(tmp_path / "gel.yaml"), friction=0.8) for _ in range(2))
+    model = spec.compile()
+    one, other = (aside(model, 9.99, x) for x in (0.0, 1.0))
+    read = [sensor.read(data).readings["markers"] for data, sensor in ((one, both), (other, both), (other, alone))]
+    assert np.abs(read[1] - read[0]).max() > 0 and (read[1] == read[2]).all()
+
+
+def test_a_copy_of_a_sensor_begins_without_contacts(coro):
+    model = mujoco.MjModel.from_xml_string(scene(box(0.5), collides=NO_CONTACT))
+    sensor, data = attach(model, "plate", coro, source="poses"), aside(model, 9.9, 0.0)
+    hand_back(data, [sensor])
+    for made in (copy.copy(sensor), copy.deepcopy(sensor), pickle.loads(pickle.dumps(sensor))):
+        assert sensor.held(data) and not made.held(data) and made.read(data).force_n[2] == sensor.read(data).force_n[2]
 
 
 @pytest.mark.parametrize(("given", "sentence"), [

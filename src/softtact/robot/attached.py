@@ -13,6 +13,7 @@ lowers the surface under another is left out.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
@@ -107,8 +108,21 @@ def attach(model: Any, body: str, sensor: Sensor | str, *, pose: Pose | Sequence
 
 
 @dataclass
+class _Memory:
+    """What a sensor keeps of one state of the scene from call to call, by the numbers of objects."""
+
+    time: float = -np.inf
+    held: dict[int, Any] = field(default_factory=dict)
+    gels: dict[int, GelReadings] = field(default_factory=dict)
+    last: dict[int, tuple[np.ndarray, PressResult]] = field(default_factory=dict)
+
+
+@dataclass
 class AttachedSensor:
-    """A sensor on a body of a scene; see `attach`. It serves any state of the scene, and compiled anew any model with its names."""
+    """A sensor on a body of a scene; see `attach`.
+
+    It serves any states of the scene side by side, each with its own contacts, and compiled anew any model with its names.
+    """
 
     sensor: Sensor
     body: str
@@ -117,13 +131,15 @@ class AttachedSensor:
     source: str
     press: str
     objects: tuple[str, ...] | None
-    held: dict[int, Any] = field(default_factory=dict)
-    """{object: its contact} of `softtact.robot.hand_back`."""
     _model: Any = None
-    _time: float = -np.inf
     _meshes: dict[int, trimesh.Trimesh] = field(default_factory=dict)
-    _gels: dict[int, GelReadings] = field(default_factory=dict)
-    _last: dict[int, tuple[np.ndarray, PressResult]] = field(default_factory=dict)
+    _memories: WeakKeyDictionary[Any, _Memory] = field(default_factory=WeakKeyDictionary)     # by the mujoco.MjData
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_memories"}     # of states that stay here
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _memories=WeakKeyDictionary())
 
     def read(self, data: Any) -> Reading:
         """The `Reading` of a mujoco.MjData, after mj_step or mj_forward.
@@ -218,16 +234,20 @@ class AttachedSensor:
         self._bind(data)
         return self._geoms
 
+    def held(self, data: Any) -> dict[int, Any]:
+        """{object: its contact} of `softtact.robot.hand_back` in a state of the scene."""
+        return self._bind(data).held
+
     def _bind(self, data):
-        """Find body, geoms and objects in a model at its first state; forget contacts where the time goes back."""
+        """The `_Memory` of a state, a new one where its time goes back; find body, geoms and objects in a model that is new."""
         if not isinstance(data, mujoco.MjData):
             raise InputError(f"A sensor is read from a mujoco.MjData, not from {type(data).__name__}.")
-        if model_is_new := data.model is not self._model:
+        if data.model is not self._model:
             self._find(data.model)
-        if model_is_new or data.time < self._time:
-            for kept in (self._gels, self._last, self.held):
-                kept.clear()
-        self._time = data.time
+        if data not in self._memories or data.time < self._memories[data].time:
+            self._memories[data] = _Memory()
+        self._memories[data].time = data.time
+        return self._memories[data]
 
     def _find(self, model):
         self._meshes.clear()
@@ -250,16 +270,16 @@ class AttachedSensor:
         most = self.sensor.spec.force_range_n[1]
         over = "" if force_n <= most else self._over
         pose, force_n = self.object_pose(data, body), min(force_n, most)
-        state = np.array([*pose.translation_mm, *pose.rotation.as_quat(canonical=True), force_n])
-        if body not in self._last or _moved(self._last[body][0], state):
+        state, last = np.array([*pose.translation_mm, *pose.rotation.as_quat(canonical=True), force_n]), self._bind(data).last
+        if body not in last or _moved(last[body][0], state):
             mesh = self._mesh(body)
             surface = HeightField(place(mesh, pose=set_down(mesh, pose)))
             try:
                 result = press_underside(self.sensor, surface, np.array([force_n]), model=self.press)
             except (InputError, ConvergenceError) as error:
                 return None, str(error)
-            self._last[body] = state, with_expected_error(self.sensor, result)
-        return self._last[body][1], over
+            last[body] = state, with_expected_error(self.sensor, result)
+        return last[body][1], over
 
     @property
     def _over(self):
@@ -267,9 +287,10 @@ class AttachedSensor:
 
     def _to_depth(self, data, body, depth_mm):
         """(`PressResult`, why it is not valid) of an object at its depth; its force before is the guess."""
-        guess = float(self._last[body][1].normal_force_n[0]) if body in self._last else 0.1 * self.sensor.spec.force_range_n[1]
+        last = self._bind(data).last
+        guess = float(last[body][1].normal_force_n[0]) if body in last else 0.1 * self.sensor.spec.force_range_n[1]
         result = with_expected_error(self.sensor, self.press_depth(data, body, depth_mm, guess).result)
-        self._last[body] = np.zeros(0), result
+        last[body] = np.zeros(0), result
         return result, "" if result.indentation_mm[0] >= _REACHED * depth_mm else self._over
 
     def _reading(self, forces, pressed):
@@ -289,18 +310,18 @@ class AttachedSensor:
 
     def _gel_reading(self, data, forces):
         """The reading of a gel, which follows the object that presses most from call to call."""
-        for body in [*self._gels]:
+        gels = self._bind(data).gels
+        for body in [*gels]:
             if body not in forces:
-                del self._gels[body]
+                del gels[body]
         spec, reason, result, readings = self.sensor.spec, "", None, None
         for body in sorted(forces, key=lambda one: forces[one][2])[:1]:
-            if body not in self._gels:
-                self._gels[body] = GelReadings(self.sensor, self._mesh(body), spec.friction.object, self.press,
-                                               spec.force_range_n[1])
+            if body not in gels:
+                gels[body] = GelReadings(self.sensor, self._mesh(body), spec.friction.object, self.press, spec.force_range_n[1])
             pose = self.object_pose(data, body)
             seven = np.concatenate([pose.translation_mm, pose.rotation.as_quat(scalar_first=True)])
-            readings, reason = self._gels[body].one(0, seven, forces[body])
-            result = self._gels[body].result(0)
+            readings, reason = gels[body].one(0, seven, forces[body])
+            result = gels[body].result(0)
         if len(forces) > 1:
             reason = f"{len(forces)} objects touch, and a gel follows the one that presses most" + f"; {reason}" * bool(reason)
         if readings is None:

@@ -128,18 +128,19 @@ def hand_back(data: Any, sensors: Sequence[AttachedSensor], *, damping_s: float 
 def _contact(sensor, data, body, depth):
     """The `_Contact` of an object and its load (6,) in N and N m."""
     pose = sensor.object_pose(data, body)
-    here, contact = (pose.translation_mm, pose.rotation), sensor.held.get(body)
+    here, held = (pose.translation_mm, pose.rotation), sensor.held(data)
+    contact = held.get(body)
     if contact is None or contact.has_moved(here):
-        contact = sensor.held[body] = _Contact.of(sensor, data, body, depth, contact)
+        contact = held[body] = _Contact.of(sensor, data, body, depth, contact)
     return contact, contact.load(here, sensor.sensor.spec.friction.object) * _LOADS
 
 
 def _in_contact(sensor, data):
     """{body: depth in mm} of the objects in a sensor; those that left are forgotten."""
-    touching = sensor.touching(data)
-    for body in [*sensor.held]:
+    touching, held = sensor.touching(data), sensor.held(data)
+    for body in [*held]:
         if body not in touching:
-            del sensor.held[body]
+            del held[body]
     return touching
 
 
