@@ -1,15 +1,22 @@
 """Many presses at once: the same as one by one, in order, whatever the processes, and none lost to one that fails."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 import trimesh
 from support.sensors import CORO
+from support.small_sensors import small_gel
 
+import softtact
 from softtact.errors import InputError
+from softtact.fem.structured_meshes import cylinder
 from softtact.files import read_dataset
 from softtact.geometry.pose import Pose
+from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import elastic_compliance
+from softtact.press.objects import SoftObject
 from softtact.press.sensor import Sensor
 from softtact.studies.hybrid.stages import presses
 
@@ -103,6 +110,20 @@ def test_a_gpu_that_is_not_there_is_refused(sensor):
 def test_a_model_that_has_no_batch_is_refused_on_a_gpu(sensor):
     with pytest.raises(InputError, match="only the elastic model presses on a GPU"):
         sensor.press_many(MESHES[0], [None], force_n=1.0, model="hyperelastic", device="cuda")
+
+
+@pytest.mark.parametrize("what", ["gel", "free lower side", "soft object"])
+def test_a_gpu_that_would_not_be_used_is_refused(sensor, what, tmp_path):
+    mesh = MESHES[0]
+    if what == "soft object":
+        mesh = SoftObject(cylinder(1.5, 2.0, (3, 2)), make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=20))
+    elif what == "gel":
+        sensor = softtact.load_sensor(small_gel(tmp_path))
+    elif what == "free lower side":
+        sensor = softtact.load_sensor("sheet")
+        sensor = replace(sensor, spec=sensor.spec.model_copy(update={"support": "none"}))
+    with pytest.raises(InputError, match=f"device='cuda': only the elastic model presses on a GPU, rigid .*{sensor.spec.name}"):
+        sensor.press_many(mesh, [None], force_n=1.0, model="elastic", device="cuda")
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")

@@ -106,6 +106,8 @@ def test_environments_run_beside_each_other_in_processes():
                                              ({"mesh": "part.stl"}, "part.stl: there is no such mesh file"),
                                              ({"largest_force_n": 90.0}, "The force 90 N is out of the range"),
                                              ({"device": "tpu"}, "tpu"),
+                                             ({"device": "cuda", "model": "foundation"}, "device='cuda': only the elastic model"),
+                                             ({"device": "cuda", "sensor": "gelsight_mini"}, "device='cuda': gels follow their ob"),
                                              ({"place_step_mm": 0.0}, "place_step_mm=0: give a length in mm above 0 and below"),
                                              ({"scene": {"frction": 1}}, "at 'frction': the key is unknown"),
                                              ({"scene": ["friction"]}, r"scene=\['friction'\]: give keys and values"),

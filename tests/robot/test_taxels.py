@@ -115,6 +115,12 @@ def test_a_sensor_whose_counts_16_bits_do_not_hold_is_refused():
         TaxelMemory(wide, CYLINDER, "elastic", LARGEST_N)
 
 
+def test_a_gpu_is_taken_by_itself_where_it_serves_alone(monkeypatch):
+    monkeypatch.setattr("softtact.press.batch.find_device", lambda name: "cuda")
+    for model, device in (("elastic", "cuda"), ("foundation", "cpu")):
+        assert TaxelMemory(load_sensor("coro"), CYLINDER, model, LARGEST_N, device="auto").device == device
+
+
 def test_a_map_that_is_carried_over_the_side_keeps_its_volume():
     sensor = load_sensor("coro")
     memory = TaxelMemory(sensor, CYLINDER, "elastic", LARGEST_N)

@@ -177,6 +177,20 @@ def together(sensor: "Sensor") -> bool:
     return ours and type(sensor.prepared("elastic")) is Compliance
 
 
+def batch_device(sensor: "Sensor", model: str, device: str, *, rigid: bool = True) -> str:
+    """Where presses of a model run that were asked for on a device by its name: the processor alone, but in batches (`together`).
+
+    rigid: whether all objects are.  Raises InputError for a GPU that would not be used; `auto` then is the processor.
+    """
+    if device != "cpu" and model == "elastic" and rigid and together(sensor):
+        return find_device(device)
+    if device not in ("cpu", "auto"):
+        raise InputError(f"device={device!r}: only the elastic model presses on a GPU, rigid objects on sensors whose lower side "
+                         f"and sides are held and whose readouts are softtact's; leave it out for the model {model!r} on "
+                         f"{sensor.spec.name}.")
+    return "cpu"
+
+
 def press_together(sensor: "Sensor", surfaces: Sequence[ObjectSurface], poses: Sequence[Any], forces_n: np.ndarray, *,
                    device: str = "cpu") -> list[Any]:
     """The `PressResult` of each press through forces (l,) in N with the elastic model, or the error in its place."""
@@ -228,9 +242,7 @@ class _Batch:
 
 def _pressed_in_turn(sensor, surfaces, poses, forces_n, *, model, device):
     """([number], its result or error) of each press."""
-    if device not in ("cpu", "auto"):
-        raise InputError(f"device={device!r}: only the elastic model presses on a GPU, on sensors whose lower side and sides are "
-                         f"held; leave it out for the model {model!r} on {sensor.spec.name}.")
+    batch_device(sensor, model, device)
     for number, (surface, pose, force) in enumerate(zip(surfaces, poses, forces_n, strict=True)):
         with warnings.catch_warnings():      # the batch counts them
             warnings.simplefilter("ignore", ShellWarning)

@@ -9,10 +9,9 @@ import numpy as np
 import trimesh
 
 from softtact.contact.undersides import ObjectSurface
-from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.pose import Pose
-from softtact.press.batch import press_together, together, warn_of_shells
+from softtact.press.batch import batch_device, press_together, together, warn_of_shells
 from softtact.press.choice import models_to_prepare
 from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
@@ -63,10 +62,12 @@ def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh | SoftObject, 
 
 
 def _pressed_all(sensor, jobs, batch):
-    model, device = batch.model, batch.device
-    gpu = bool(jobs) and on_gpu(device, model)
-    if jobs and model == "elastic" and together(sensor) and not any(isinstance(mesh, SoftObject) for mesh, _ in jobs):
-        return _pressed_together(sensor, jobs, batch, device=("cuda" if device == "auto" else device) if gpu else "cpu")
+    if not jobs:
+        return []
+    model, rigid = batch.model, not any(isinstance(mesh, SoftObject) for mesh, _ in jobs)
+    device = batch_device(sensor, model, batch.device, rigid=rigid)
+    if model == "elastic" and rigid and together(sensor):
+        return _pressed_together(sensor, jobs, batch, device=device)
     prepared = _PREPARED.get(model, ())
     if model == "auto" and sensor.spec.has_layers and sensor.spec.edge.far:
         prepared = ("elastic",)
@@ -113,15 +114,6 @@ def _pressed_together(sensor, jobs, batch, *, device):
 def _part_pressed(sensor, pairs, *, force_n, device):
     surfaces, poses = zip(*pairs, strict=True)
     return press_together(sensor, surfaces, poses, force_n, device=device)
-
-
-def on_gpu(device: str, model: str) -> bool:
-    """Whether presses of a model run as one batch on a GPU, if one is requested or available; only the elastic model can."""
-    if device == "cpu" or (device == "auto" and model != "elastic"):
-        return False
-    if model != "elastic":
-        raise InputError(f"device={device!r}: only the elastic model presses on a GPU; leave it out for the model {model!r}.")
-    return find_device(device) != "cpu"
 
 
 def _each(sensor, act, jobs, workers):

@@ -54,7 +54,8 @@ class BatchOptions(TypedDict, total=False):
     """Processes; by default one for each core."""
     device: str
     """`cuda`, or `auto` where there is a GPU, runs the elastic model's batch on it; on the `cpu` its batches, and the presses of
-    the other models, run in processes."""
+    the other models, run in processes. `cuda` is refused where no batch runs: with other models, soft objects, gels and sensors
+    whose lower side is free."""
     failures: str
     """`raise` the first, after all are done (default), or `keep` each error in its press' place."""
     label: str

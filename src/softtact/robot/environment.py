@@ -86,6 +86,9 @@ class GraspEnv(gymnasium.Env):
 
     def _new_readings(self) -> TaxelMemory | GelReadings:
         if has_gel(self._sensor):
+            if self._device not in ("cpu", "auto"):
+                raise InputError(f"device={self._device!r}: gels follow their objects on the processor; leave it out for "
+                                 f"{self._sensor.spec.name}.")
             return GelReadings(self._sensor, self._mesh, self._settings.friction, self._model, self.largest_force_n)
         return TaxelMemory(self._sensor, self._mesh, self._model, self.largest_force_n, self._place_step_mm,
                            self._device)

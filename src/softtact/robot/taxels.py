@@ -21,12 +21,11 @@ from scipy.spatial.transform import Rotation
 from softtact.compiled import compiled
 from softtact.contact.height_field import HeightField
 from softtact.contact.undersides import ObjectSurface
-from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.linalg.workers import Workers, one_thread_each
-from softtact.press.batch import press_together, together
+from softtact.press.batch import batch_device, press_together
 from softtact.press.choice import ELASTIC_RELATIVE, rms, with_expected_error
 from softtact.press.fast import press_underside, thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
@@ -75,10 +74,7 @@ class TaxelMemory:
     def __post_init__(self) -> None:
         self.sensor.spec.need_taxels("the environment")
         need_whole_counts(self.sensor.spec, "the environment")
-        self.device = find_device(self.device)
-        if self.device != "cpu" and not (self.model == "elastic" and together(self.sensor)):
-            raise InputError(f"device={self.device!r}: only the elastic model presses places on a GPU, on sensors whose lower side "
-                             "is held; leave it out.")
+        self.device = batch_device(self.sensor, self.model, self.device)
         side = min(self.sensor.spec.footprint_mm)
         if not 0 < self.step_mm < side:
             raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
