@@ -22,6 +22,10 @@ class InputError(SofttactError):
     """A file, a field or an argument is not usable as given."""
 
 
+class MissError(InputError):
+    """An object lies beside the sensor, or what else it is to be pressed on, so that nothing is touched."""
+
+
 class UnreadableError(InputError):
     """A file exists, and the system does not let us read it."""
 

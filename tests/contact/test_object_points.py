@@ -7,7 +7,7 @@ from small_layer import ball, flat_box, placed, punch, underside
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.node_grid import NodeGrid
-from softtact.errors import InputError
+from softtact.errors import MissError
 
 STEP = 0.34                                        # mm, about that of the sensor's grid
 GRID = NodeGrid(STEP * np.arange(-20, 21), STEP * np.arange(-24, 25))
@@ -205,7 +205,7 @@ def test_an_object_over_the_border_covers_the_outermost_nodes_as_if_the_grid_wen
 
 
 def test_an_object_that_misses_the_free_surface_is_refused():
-    with pytest.raises(InputError, match="misses every free point"):
+    with pytest.raises(MissError, match="misses every free point"):
         underside(placed(punch(1.0), (9.0, 0, 0, 0, 0, 0)), GRID)
 
 

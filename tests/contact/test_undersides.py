@@ -11,7 +11,7 @@ from softtact.contact.narrow_parts import lowest_missed
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
 from softtact.contact.undersides import ObjectSurface, Target
-from softtact.errors import InputError
+from softtact.errors import MissError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 
@@ -92,5 +92,5 @@ def test_a_sensor_without_a_shell_stops_no_object():
 
 
 def test_an_object_beside_the_sensor_is_refused_with_where_it_is():
-    with pytest.raises(InputError, match="misses the sensor: it spans x 46 to 54 mm"):
+    with pytest.raises(MissError, match="misses the sensor: it spans x 46 to 54 mm"):
         ObjectSurface(MESHES["ball"]).over(target(NodeGrid(X_MM, Y_MM, True)), Pose.from_values((50, 0, 0, 0, 0, 0)))

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 from support.sensors import CORO, zeroed_at
+from support.small_sensors import small_gel
 
 from softtact.errors import InputError
 from softtact.geometry.pose import Pose
@@ -99,6 +100,16 @@ def test_the_expected_error_of_a_reading_is_that_of_its_press():
 def test_an_object_beside_the_sensor_is_not_felt():
     memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
     assert memory.counts(0, np.array([30.0, 0, 0, 1, 0, 0, 0]), 5.0).max() < 1e-9
+
+
+def test_any_other_fault_of_a_press_is_no_reading_of_zero(tmp_path, monkeypatch):
+    (tmp_path / "gel.yaml").write_text(small_gel(tmp_path).read_text() + "taxels: {rows: 2, columns: 2}")
+    gel = TaxelMemory(load_sensor(tmp_path / "gel.yaml"), CYLINDER, "elastic", 10.0)
+    with pytest.raises(InputError, match="small_gel is a gel with far sides, of which no maps over force are kept"):
+        gel.counts(0, np.array([0.0, 0, 0, 1, 0, 0, 0]), 5.0)
+    monkeypatch.setattr("softtact.robot.taxels.press_together", lambda *given, **options: [InputError("The mesh is not closed.")])
+    with pytest.raises(InputError, match="The mesh is not closed"):
+        TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)._press_together([(0, 0, 0, 0)])
 
 
 def test_counts_of_a_calibrated_sensor_below_its_baseline_are_read_as_zero():

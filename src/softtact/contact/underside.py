@@ -18,7 +18,7 @@ from softtact.contact.narrow_parts import lowest_missed
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, ObjectPoints, hat_shares, window_places
 from softtact.contact.unilateral import depth_on_springs
-from softtact.errors import InputError
+from softtact.errors import MissError
 
 MISSES = "The object misses every free point of the sensor's surface; move it over the sensor."
 _SMOOTH = 0.6        # largest slope of a surface without an edge
@@ -39,7 +39,7 @@ class Underside:
         self._height, self._slope = self._coarse[:, 4], surface.slopes_of(over_node)
         self.lowest_mm = min(float(self._coarse.min()), surface.first_touch_mm(grid.x, grid.y))
         if self.lowest_mm >= NO_CONTACT_MM:
-            raise InputError(MISSES)
+            raise MissError(MISSES)
 
     def depth_on_springs(self, force_n: float, foundation_modulus: float) -> float:
         """First guess of the depth (mm) below first touch under a force: on a Winkler foundation of `foundation_modulus` N/mm3,

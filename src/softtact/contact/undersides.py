@@ -23,7 +23,7 @@ from softtact.contact.narrow_parts import margin
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.shell import Shell
 from softtact.contact.underside import MISSES
-from softtact.errors import InputError
+from softtact.errors import InputError, MissError
 from softtact.geometry.meshes import check_given, check_over_sensor, default_pose, place
 from softtact.geometry.pose import Pose
 
@@ -45,11 +45,11 @@ class ObjectSurface:
         return default_pose(self.mesh)
 
     def over(self, target: "Target", pose: Pose | None) -> "PosedUnderside":
-        """Its underside in a pose, None for the centred one. Raises InputError where it misses the sensor."""
+        """Its underside in a pose, None for the centred one. Raises MissError where it misses the sensor."""
         points = (pose or self.centred).apply(self._points)
         try:
             return underside_of(facing_down(points, self._facets)[0], target, top_mm=float(points[:, 2].max()))
-        except InputError:
+        except MissError:
             check_over_sensor(place(self.mesh, pose=pose), target.footprint_mm)      # says where it is
             raise
 
@@ -97,11 +97,11 @@ class PosedUnderside:
 def underside_of(triangles: np.ndarray, target: Target, *, top_mm: float = np.nan) -> PosedUnderside:
     """The underside of an object by its triangles that face down, (t, 3, 3) in mm in its pose; top_mm: height of its top.
 
-    Raises InputError where it misses all free points of the sensor's surface.
+    Raises MissError where it misses all free points of the sensor's surface.
     """
     heights, touch, shell = _underside(triangles, *target.arrays)
     if max(touch, heights.min()) >= NO_CONTACT_MM:
-        raise InputError(MISSES)
+        raise MissError(MISSES)
     stop = shell + target.shell.below_mm if shell < NO_CONTACT_MM else np.inf
     return PosedUnderside(heights, touch, stop, top_mm - touch)
 

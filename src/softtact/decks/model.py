@@ -16,7 +16,7 @@ import trimesh
 from softtact.contact.friction import Coulomb
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.penalty import Contact
-from softtact.errors import InputError
+from softtact.errors import InputError, MissError
 from softtact.fem.elements import HEX27, WEDGE18
 from softtact.fem.extruded_mesh import Mesh2D
 from softtact.geometry.meshes import facets_over
@@ -306,7 +306,7 @@ def _object(body, surface):
     near = facets_over(surface.triangles, footprint) & (lowest <= lowest.min(initial=np.inf) + reach)
     near &= _widths(surface.triangles) > SLIVER_MM
     if not near.any():
-        raise InputError("The object misses the sensor: none of its facets that face down lies over it; correct its pose.")
+        raise MissError("The object misses the sensor: none of its facets that face down lies over it; correct its pose.")
     points, facets = np.unique(surface.triangles[near].reshape(-1, 3), axis=0, return_inverse=True)
     return RigidSurface("OBJECT", points, facets.reshape(-1, 3), moves=True)
 

@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 from manifold3d import Manifold, Mesh64
 
-from softtact.errors import InputError
+from softtact.errors import InputError, MissError
 from softtact.geometry.formats import STATED_MM, UNIT_MM, Facets, in_mm, read_facets
 from softtact.geometry.pose import Pose
 
@@ -157,10 +157,10 @@ def check_over_sensor(mesh: trimesh.Trimesh, footprint_mm: tuple[float, float], 
         raise misses_sensor(mesh.vertices, footprint_mm, name=name)
 
 
-def misses_sensor(points: np.ndarray, footprint_mm: tuple[float, float], *, name: str = "The object") -> InputError:
+def misses_sensor(points: np.ndarray, footprint_mm: tuple[float, float], *, name: str = "The object") -> MissError:
     """The refusal of an object with points (n, 3) in mm of which nothing lies over the sensor's footprint."""
     (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
-    return InputError(f"{name} misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no part of "
+    return MissError(f"{name} misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no part of "
                       f"it is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose.")
 
 

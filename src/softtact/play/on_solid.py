@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from softtact.errors import InputError
+from softtact.errors import MissError
 from softtact.fem.solid_mesh import fine_triangles
 from softtact.geometry.pose import Pose
 from softtact.geometry.repair import Mended
@@ -64,7 +64,7 @@ class OnSolid:
         distance = distance_to_touch(pose.apply(mesh.vertices)[mesh.faces], self._face, _DOWN)
         if not np.isfinite(distance):
             spec = self.sensor.spec
-            raise InputError(f"The object misses the face {spec.contact.face!r} of {spec.name}; move it over the sensor.")
+            raise MissError(f"The object misses the face {spec.contact.face!r} of {spec.name}; move it over the sensor.")
         return Pose(pose.translation_mm + distance * _DOWN, pose.rotation)
 
     def _at_rest(self) -> PressResult:

@@ -118,7 +118,7 @@ def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, 
     """Maps (l, ny, nx) in mm of the decrease in thickness of a sensor at rising forces (N), from which its readings follow.
 
     surface: the underside of an object;  model: elastic or foundation
-    Raises InputError where the object misses the sensor, ConvergenceError for a force that is not reached.
+    Raises MissError where the object misses the sensor, ConvergenceError for a force that is not reached.
     """
     if sensor.spec.edge.far:
         raise InputError(f"{sensor.spec.name} is a gel with far sides, of which no maps over force are kept; press it by motions.")

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.errors import ConvergenceError, InputError, require
+from softtact.errors import ConvergenceError, InputError, MissError, require
 from softtact.geometry.pose import Pose
 from softtact.models.solid.result import SolidFields
 from softtact.press.result import PressResult
@@ -110,7 +110,7 @@ def over_skin(skin: "Skin", mesh: trimesh.Trimesh, pose: Pose | None, name: str)
         if skin.layout.inside(placed.bounds.mean(axis=0)[None, :2], margin_mm=0.0)[0]:
             raise InputError(f"The object lies between the points of the mesh of {name}: it is {x1 - x0:.4g} x {y1 - y0:.4g} mm; "
                              "correct its unit, or give a smaller mesh.spacing_mm in the sensor's file.")
-        raise InputError(f"The object misses the skin {name}: it spans x {x0:.4g} to {x1:.4g}, y {y0:.4g} to {y1:.4g} mm, beside "
+        raise MissError(f"The object misses the skin {name}: it spans x {x0:.4g} to {x1:.4g}, y {y0:.4g} to {y1:.4g} mm, beside "
                          "the elastomer; correct its pose.")
     placed.apply_translation([0.0, 0.0, skin.thickness_mm - height.min()])
     return placed

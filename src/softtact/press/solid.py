@@ -17,7 +17,7 @@ from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surface_places import places
 from softtact.contact.surfaces import Surface, quadrature_points
-from softtact.errors import InputError
+from softtact.errors import InputError, MissError
 from softtact.fem.files.solids import read_mesh_file, with_named_faces
 from softtact.fem.solid_mesh import SolidMesh, fine_triangles
 from softtact.geometry.meshes import check_over_sensor, place
@@ -188,7 +188,7 @@ def _to_touch(sensor: "Sensor", triangles: np.ndarray, direction: np.ndarray) ->
     distance = distance_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)  # type: ignore[union-attr]
     if not np.isfinite(distance):
         (x0, y0, z0), (x1, y1, z1) = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-        raise InputError(f"The object misses the face {spec.contact.face!r} of {spec.name}: it spans x {x0:.4g} to "
+        raise MissError(f"The object misses the face {spec.contact.face!r} of {spec.name}: it spans x {x0:.4g} to "
                          f"{x1:.4g}, y {y0:.4g} to {y1:.4g}, z {z0:.4g} to {z1:.4g} mm, and moving along ({direction[0]:.3g}, "
                          f"{direction[1]:.3g}, {direction[2]:.3g}) does not meet it; correct its pose or its motion.")
     return distance * direction

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from softtact.compiled import compiled
 from softtact.contact.height_field import HeightField
 from softtact.contact.undersides import ObjectSurface
-from softtact.errors import ConvergenceError, InputError, SofttactError
+from softtact.errors import InputError, MissError, SofttactError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.linalg.workers import Workers, one_thread_each
@@ -179,9 +179,9 @@ class TaxelMemory:
         poses = [Pose(np.array([x, y, 0.0]) * self.step_mm, self._turned(finger, turn)) for finger, x, y, turn in keys]
         results = press_together(self.sensor, [ObjectSurface(self.mesh)] * len(keys), poses, self.forces_n, device=self.device)
         for key, result in zip(keys, results, strict=True):
-            if isinstance(result, ConvergenceError):
+            beside = isinstance(result, MissError)
+            if isinstance(result, SofttactError) and not beside:
                 raise result
-            beside = isinstance(result, SofttactError)
             maps = np.zeros((_FORCES, *self.sensor.spec.map_shape)) if beside else result.thinning_map_mm
             self._ladders[key] = self._place(maps, np.full(_FORCES, 0.0 if beside else ELASTIC_RELATIVE))
 
@@ -195,7 +195,7 @@ class TaxelMemory:
                 result = with_expected_error(self.sensor, press_underside(self.sensor, surface, self.forces_n, model=self.model))
                 maps = result.deformation_map_mm
                 relative = result.expected_error_mm / np.maximum(rms(maps), np.finfo(float).tiny)
-        except InputError:     # the object is beside this sensor
+        except MissError:     # the object is beside this sensor
             maps, relative = np.zeros((_FORCES, *self.sensor.spec.map_shape)), np.zeros(_FORCES)
         return self._place(maps, relative)
 

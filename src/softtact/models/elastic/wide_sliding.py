@@ -23,7 +23,7 @@ from softtact.contact.coulomb import CoulombSettings, Increment
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.motion import MotionStep
 from softtact.contact.unilateral import depth_on_springs
-from softtact.errors import InputError
+from softtact.errors import InputError, MissError
 from softtact.models.elastic.grid_contact import GridContact, GridSolver
 from softtact.models.elastic.wide_layer import WideLayer
 
@@ -270,7 +270,7 @@ class WideObject:
         index = np.column_stack([(y - self.points[1, 0, 0]) / dy, (x - self.points[0, 0, 0]) / dx])
         index = np.concatenate([index, touched]) if len(touched) else index
         if not len(index):
-            raise InputError("The object is nowhere near the gel; move it over the gel.")
+            raise MissError("The object is nowhere near the gel; move it over the gel.")
         sides = []
         for axis, count in enumerate(self._shape):
             least = int(np.clip(np.floor(index[:, axis].min()) - _MARGIN, 0, count - 1))
