@@ -91,6 +91,14 @@ def test_taxels_are_those_of_a_press_at_that_place_and_force(env):
     assert np.abs(seen[-1]["tactile"][0] - exact.tactile_map[0]).max() <= 0.02 * exact.tactile_map.max()     # linear between forces
 
 
+def test_a_force_above_the_largest_whose_map_is_the_reading_is_told():
+    weak = gymnasium.make(ID, largest_force_n=0.5)     # the fingers' motors have 1 N at least
+    seen, *_, info = play(weak, ((1.0, 0.0, 0.0), 40), options=STILL)
+    assert info["force_above_largest_n"] == pytest.approx(-seen[-1]["force_n"][:, 2] - 0.5, rel=1e-5)
+    assert info["force_above_largest_n"].min() > 0.3
+    assert not play(weak, ((-0.5, 0.0, 0.0), 1))[-1]["force_above_largest_n"].any()
+
+
 @pytest.mark.slow
 def test_environments_run_beside_each_other_in_processes():
     many = gymnasium.make_vec(ID, num_envs=2, vectorization_mode="async", vector_kwargs={"context": "spawn"})

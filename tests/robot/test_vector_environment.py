@@ -65,6 +65,14 @@ def test_infos_are_those_of_single_environments_with_the_error_to_expect(both):
     assert ((np.stack(last[-1]["expected_error_mm"]) > 0) == felt).all()
 
 
+def test_forces_above_the_largest_are_told_of_each_hand():
+    *_, infos = play(make("vector_entry_point", largest_force_n=0.5), LONGEST)[-1]
+    *_, others = play(make("sync", largest_force_n=0.5), LONGEST)[-1]
+    above = np.stack(infos["force_above_largest_n"])
+    assert above.shape == (2, 2) and above.max() > 0.1
+    assert np.array_equal(above, np.stack(others["force_above_largest_n"])) and infos["_force_above_largest_n"].all()
+
+
 def test_gymnasium_s_rules_for_spaces_and_autoreset_hold(batch):
     assert batch.metadata["autoreset_mode"] is gymnasium.vector.AutoresetMode.NEXT_STEP
     assert batch.observation_space.contains(batch.reset(seed=1)[0]) and batch.action_space.shape == (2, 3)

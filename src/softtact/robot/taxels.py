@@ -7,7 +7,8 @@ Between places the map of the nearest one is moved and rotated with the object, 
 sinks. The effect of the sensor's edges does not move with the object. So along x, where a hand slides, the maps of both places
 beside the object are interpolated. `benchmarks/environment.py` measures the error of the readings.
 
-Readings do not depend on earlier calls. Tilt is left out: a held object's tilt follows from MuJoCo's contacts, not from the rubber.
+Readings do not depend on earlier calls. Above the largest force they stay as at it (`above_largest`). Tilt is left out: a held
+object's tilt follows from MuJoCo's contacts, not from the rubber.
 """
 
 import warnings
@@ -81,7 +82,7 @@ class TaxelMemory:
                              f"{side:g}.")
         self.forces_n = even_in_root(self.sensor.checked_forces(self.largest_force_n)[0], _FORCES)
         self._blank = Ladder(self.forces_n, np.empty(0))
-        self._errors_mm = np.zeros(len(FINGERS))
+        self._errors_mm, self._above_n = np.zeros((2, len(FINGERS)))
         self._step = np.array([self.step_mm, self.step_mm, _STEP_DEG])
         spec = self.sensor.spec
         self._first_mm = np.array([spec.map_y_mm[0], spec.map_x_mm[0]])     # as maps are indexed: y, x
@@ -99,7 +100,7 @@ class TaxelMemory:
     def observe(self, poses: np.ndarray, forces: np.ndarray) -> dict[str, np.ndarray]:
         """{tactile: (finger, row, column)} of both sensors under an object at poses (finger, 7) with forces (finger, 3) in N."""
         seen, errors = self.observe_many(poses[None], forces[None])
-        self._errors_mm = errors[0]
+        self._errors_mm, self._above_n = errors[0], self.above_largest(forces)
         return {name: values[0] for name, values in seen.items()}
 
     def observe_many(self, poses: np.ndarray, forces: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -113,8 +114,14 @@ class TaxelMemory:
         return {"tactile": whole_counts(counts).reshape(*shape, *counts.shape[1:])}, errors.reshape(shape)
 
     def facts(self) -> dict[str, Any]:
-        """What an environment tells beside the readings: expected errors (finger,) of the last maps in mm, number of places."""
-        return {"places_pressed": self.places, "expected_error_mm": self._errors_mm}
+        """What an environment tells beside the readings: the number of places, expected errors (finger,) of the last maps in mm, by
+        how much (finger,) in N the forces are above the largest.
+        """
+        return {"places_pressed": self.places, "expected_error_mm": self._errors_mm, "force_above_largest_n": self._above_n}
+
+    def above_largest(self, forces: np.ndarray) -> np.ndarray:
+        """By how much (...) in N forces (..., 3) press harder than the largest one, whose map is then the reading; 0 where none."""
+        return np.maximum(-forces[..., 2] - self.largest_force_n, 0.0)
 
     @property
     def places(self) -> int:

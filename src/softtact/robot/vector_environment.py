@@ -24,7 +24,8 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
     """A batch of `GraspEnv`s with the same object and sensor.
 
     Autoreset is gymnasium's NEXT_STEP: the step after the end of an episode begins the next one, its action is not used, and its
-    reward is 0. `info` holds arrays (n, ...) with masks (`_NAME`) as gymnasium has them; `expected_error_mm` (n, 2) of taxels.
+    reward is 0. `info` holds arrays (n, ...) with masks (`_NAME`) as gymnasium has them; `expected_error_mm` and
+    `force_above_largest_n` (n, 2) of taxels.
     """
 
     metadata = {**GraspEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -111,7 +112,8 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
             facts = [hand.readings.facts() for hand in hands]
         else:
             read, errors = readings.observe_many(poses, forces)
-            facts = [{**readings.facts(), "expected_error_mm": error} for error in errors]
+            facts = [{**readings.facts(), "expected_error_mm": error, "force_above_largest_n": above}
+                     for error, above in zip(errors, readings.above_largest(forces), strict=True)]
         for number, hand, fact in zip(numbers, hands, facts, strict=True):
             infos = self._add_info(infos, {**hand.scene_facts(), **fact}, int(number))
         now = {**read, **observed_loads(poses, forces)}
