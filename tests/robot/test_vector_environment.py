@@ -103,6 +103,23 @@ def test_some_hands_alone_begin_again(batch):
     assert not infos["_risen_mm"][0] and infos["_risen_mm"][1]
 
 
+def test_a_first_reset_of_some_hands_alone_is_refused_and_begins_none():
+    many = make("vector_entry_point")
+    with pytest.raises(InputError, match="reset: the option reset_mask leaves out hand 1, which has no episode yet; reset all h"):
+        many.reset(seed=1, options={"reset_mask": np.array([True, False])})
+    with pytest.raises(InputError, match="step: there is no scene yet; call reset first"):
+        many.step(np.zeros((2, 3)))
+    assert not any(hand.has_scene for hand in many._hands)
+
+
+def test_no_hand_moves_while_another_has_no_episode():
+    many = make("vector_entry_point")
+    many._hands[0].begin(seed=1)     # as a first reset leaves it that is refused at the second hand
+    with pytest.raises(InputError, match="step: there is no scene yet; call reset first"):
+        many.step(np.zeros((2, 3)))
+    assert many._hands[0]._data.time == 0.0
+
+
 def test_gels_follow_their_objects_each(tmp_path):
     (tmp_path / "gel.yaml").write_text(SMALL_GEL)
     many = make("vector_entry_point", sensor=str(tmp_path / "gel.yaml"))

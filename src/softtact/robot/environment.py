@@ -138,8 +138,7 @@ class GraspEnv(gymnasium.Env):
 
     def advance(self, action: np.ndarray) -> tuple[float, bool]:
         """The scene's part of a step: the reward, and whether the episode ends."""
-        if not hasattr(self, "_scene"):
-            raise InputError("step: there is no scene yet; call reset first.")
+        self.need_scene()
         grip, lift, slide = np.clip(three_numbers(action), -1.0, 1.0)
         self._move_hand(lift, slide)
         self._move_fingers(0.5 * (grip + 1.0))
@@ -149,6 +148,16 @@ class GraspEnv(gymnasium.Env):
         risen = self._risen_mm()
         ended = risen < -_DROPPED_MM or risen > 0.98 * LIFT_MM
         return float((risen - before) / LIFT_MM), bool(ended)
+
+    @property
+    def has_scene(self) -> bool:
+        """Whether an episode has begun."""
+        return hasattr(self, "_scene")
+
+    def need_scene(self) -> None:
+        """Raise InputError before the first reset."""
+        if not self.has_scene:
+            raise InputError("step: there is no scene yet; call reset first.")
 
     def render(self) -> np.ndarray | None:
         """Image (480, 640, 3), uint8, of the hand and the object; None without a `render_mode`."""

@@ -64,6 +64,9 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
             raise InputError(f"reset: the option reset_mask has the shape {mask.shape}; give {self.num_envs} times True or False.")
         if not mask.any():
             raise InputError("reset: the option reset_mask names no hand; give True for at least one.")
+        if new := [int(hand) for hand in np.flatnonzero(~mask) if not self._hands[hand].has_scene]:
+            raise InputError(f"reset: the option reset_mask leaves out hand {new[0]}, which has no episode yet; reset all hands "
+                             "first.")
         seeds = _seeds(seed, self.num_envs)
         for hand in np.flatnonzero(mask):
             self._hands[hand].begin(seed=seeds[hand], options=given)
@@ -77,6 +80,8 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
         if len(actions) != self.num_envs:
             raise InputError(f"step: {len(actions)} actions for {self.num_envs} hands; give one for each.")
         checked = [three_numbers(action) for action in actions]     # before any hand moves
+        for hand in self._hands:
+            hand.need_scene()
         rewards, ended = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         for number, (hand, action) in enumerate(zip(self._hands, checked, strict=True)):
             if self._over[number]:
