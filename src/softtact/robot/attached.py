@@ -291,7 +291,8 @@ class AttachedSensor:
         guess = float(last[body][1].normal_force_n[0]) if body in last else 0.1 * self.sensor.spec.force_range_n[1]
         result = with_expected_error(self.sensor, self.press_depth(data, body, depth_mm, guess).result)
         last[body] = np.zeros(0), result
-        return result, "" if result.indentation_mm[0] >= _REACHED * depth_mm else self._over
+        wanted = min(depth_mm, self.sensor.spec.thickness_mm)
+        return result, "" if result.indentation_mm[0] >= _REACHED * wanted else self._over
 
     def _reading(self, forces, pressed):
         """The sum of the presses of several objects."""
