@@ -161,7 +161,7 @@ def misses_sensor(points: np.ndarray, footprint_mm: tuple[float, float], *, name
     """The refusal of an object with points (n, 3) in mm of which nothing lies over the sensor's footprint."""
     (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
     return MissError(f"{name} misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no part of "
-                      f"it is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose.")
+                     f"it is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose.")
 
 
 def facets_over(triangles: np.ndarray, footprint_mm: tuple[float, float]) -> np.ndarray:
