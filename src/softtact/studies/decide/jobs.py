@@ -7,7 +7,8 @@
     readings/TRUTH.nc                      the virtual sensor's counts of all items
     learning/TRUTH/MODEL_compact.csv, _printed_SEED.csv, _curve.csv      scores of networks, and on growing shares of indenters
     tables/power.csv                       stated before any score is known
-    tables/scores.csv, hypotheses.csv, learning_curve.csv, robustness.csv, collapse.csv, claims.csv
+    tables/scores.csv, mean_scores.csv     of each object, and their means
+    tables/hypotheses.csv, learning_curve.csv, robustness.csv, collapse.csv, claims.csv
     figures/, report.html
 """
 
@@ -36,6 +37,7 @@ from softtact.studies.decide.config import (
 from softtact.studies.jobs import Job, figure_files, from_here
 
 TABLES = ("scores", "hypotheses", "learning_curve", "power", "robustness", "collapse")
+ON_PAGE = (*TABLES, "mean_scores", "claims")
 
 
 def jobs(study: DecideStudy, folder: str | Path) -> list[Job]:
@@ -170,7 +172,7 @@ class _Jobs:
         values, folder = self.values, self.folder
         statistics = values.statistics.model_dump(mode="json")
         common = {"seed": values.seed, "ssim_window": values.ssim_window}
-        table = {name: f"{folder}/tables/{name}.csv" for name in (*TABLES, "claims")}
+        table = {name: f"{folder}/tables/{name}.csv" for name in ON_PAGE}
         learned = self.learning()
         scored = [Job("score_formulas", self.maps(truth), {"scores": f"{folder}/scores/{{truth}}.csv"},
                       common | {"truth": truth, "scored": values.scored}, {"truth": truth}) for truth in self.study.truths]
@@ -183,7 +185,8 @@ class _Jobs:
                                          "facts": self.facts(),
                                          **{f"presses_{model}": self.presses(model, self.study.objects) for model in MODELS},
                                          **self.sensor},
-                       {name: table[name] for name in ("scores", "learning_curve")} | {"choices": f"{folder}/scores/choices.csv"},
+                       {name: table[name] for name in ("scores", "mean_scores", "learning_curve")}
+                       | {"choices": f"{folder}/scores/choices.csv"},
                        common | {"tolerance_mm": values.tolerance_mm})
         shown = {f"presses_{truth}": self.presses(model, self.study.objects) for truth, model in self.study.truths.items()}
         judged = Job("judge", {"scores": table["scores"], "power": table["power"], "choices": f"{folder}/scores/choices.csv",
@@ -228,7 +231,7 @@ class _Jobs:
 
     def figures(self) -> list[Job]:
         """The figures and the page."""
-        folder, table = self.folder, {name: f"{self.folder}/tables/{name}.csv" for name in (*TABLES, "claims")}
+        folder, table = self.folder, {name: f"{self.folder}/tables/{name}.csv" for name in ON_PAGE}
         shown = next(item for item in reversed(self.study.objects) if item.set == "stepped")
         maps = {f"presses_{model}": self.presses(model, [shown]) for model in (*self.values.truths, *MODELS)}
         drawn = {

@@ -9,7 +9,7 @@ import pandas as pd
 from softtact.files import read_csv, read_dataset, read_json, write_csv
 from softtact.sensors.frusta import SensorSpec
 from softtact.studies.decide.config import MODELS
-from softtact.studies.decide.scoring import MEAN_READING
+from softtact.studies.decide.scoring import MEAN_READING, SCORES
 
 _FLAT = 0.05     # of the error: what it may fall by for twice as many maps, at the rate of the curve's last step, to count as flat
 
@@ -49,7 +49,7 @@ def gather_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     """Join the scores of all truths, models and readouts, and add those of the policies and of the mean reading.
 
     inputs: formulas, networks, curves (lists of CSV), facts (JSON of the objects), presses_MODEL (lists, of the objects), sensor
-    outputs: scores, choices (a row for each object), learning_curve (CSV)
+    outputs: scores, mean_scores, choices (a row for each object), learning_curve (CSV)
     settings: seed, ssim_window, tolerance_mm
     """
     from softtact.studies.decide.policies import choice_table, policy_scores
@@ -59,11 +59,17 @@ def gather_scores(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
                            tolerance_mm=settings["tolerance_mm"])
     scores = pd.concat([read_csv(path) for path in [*inputs["formulas"], *inputs["networks"]]], ignore_index=True)
     models = scores[scores.model != MEAN_READING]
-    write_csv(outputs["scores"], pd.concat([models, policy_scores(models, choices), baseline_of_readouts(scores)],
-                                           ignore_index=True))
+    whole = pd.concat([models, policy_scores(models, choices), baseline_of_readouts(scores)], ignore_index=True)
+    write_csv(outputs["scores"], whole)
+    write_csv(outputs["mean_scores"], mean_scores(whole))
     write_csv(outputs["choices"], choices)
     curves = pd.concat([read_csv(path) for path in inputs["curves"]], ignore_index=True)
     write_csv(outputs["learning_curve"], with_flatness(curves))
+
+
+def mean_scores(scores: pd.DataFrame) -> pd.DataFrame:
+    """A row for each truth, readout, kind of object and contestant: means over objects and seeds."""
+    return scores.groupby(["truth", "readout", "kind", "model"], sort=False)[SCORES].mean().reset_index()
 
 
 def baseline_of_readouts(scores: pd.DataFrame) -> pd.DataFrame:

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pandas as pd
-
 from softtact.files import read_csv
 from softtact.reporting.page import Page, counted
 
@@ -26,7 +24,8 @@ _MOST_ROWS = 60
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the page.
 
-    inputs: scores, hypotheses, learning_curve, power, robustness, collapse, claims (CSV), figures (list);  outputs: page
+    inputs: scores, mean_scores, hypotheses, learning_curve, power, robustness, collapse, claims (CSV), figures (list)
+    outputs: page
     settings: study, names (of the figures), shown (the object of the maps), config
     """
     tables = {name: read_csv(path, keep_default_na=name != "claims") for name, path in inputs.items() if name != "figures"}
@@ -54,14 +53,8 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     page.text("Means over objects and seeds. Error over the mean reading: sum of the errors over the sum of the readings. SSIM "
               "has either the range of each map, or the converter's with the smallest and the largest window that fits, for the "
               "paper states none. The mean reading at a force reads no map, and is the same beside each readout.")
-    page.table(mean_scores(tables["scores"]), file=inputs["scores"])
+    page.table(tables["mean_scores"], file=inputs["scores"])
     for name, title in _TITLES.items():
         page.table(tables[name], title, file=inputs[name], most_rows=_MOST_ROWS)
     page.configuration(settings["config"])
     page.write(outputs["page"])
-
-
-def mean_scores(scores: pd.DataFrame) -> pd.DataFrame:
-    """A row for each truth, readout, kind of object and contestant: means over objects and seeds."""
-    names = ["error_share", "ssim_own_range", "ssim_paper", "ssim_paper_whole"]
-    return scores.groupby(["truth", "readout", "kind", "model"], sort=False)[names].mean().reset_index()
