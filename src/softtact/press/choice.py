@@ -1,10 +1,10 @@
 """Choice of the model of a press: by the expected error of each cheaper model, or by the paper's count of mesh points.
 
 `error`: the cheapest model that is within the tolerance in nine of ten presses and valid for all load steps. Both fast models are
-pressed first, in about a second. Their difference is nearly the elastic model's error, since the foundation model is closer to the
-hyperelastic one by an order of magnitude: squares of the difference and of the foundation model's own expected error are added. That
-one grows with the depth of the object. After a model that fails, or is not valid for a load step, the next one is tried; if the hyperelastic one is not valid
-either, the result states that no model is.
+pressed first, in about a second. Their difference is nearly the elastic model's error, since the foundation model is closer to
+the hyperelastic one by an order of magnitude: squares of the difference and of the foundation model's own expected error are
+added. That one grows with the depth of the object. After a model that fails, or is not valid for a load step, the next one is
+tried; if the hyperelastic one is not valid either, the result states that no model is.
 `paper`: the hyperelastic model for an object with fine details, else the elastic one (`geometry.complexity`).
 Errors are root mean squares over the map, in mm, against the hyperelastic model; the largest of a press' load steps counts.
 """
