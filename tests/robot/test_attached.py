@@ -301,6 +301,21 @@ def test_two_states_of_a_scene_that_run_beside_each_other_have_contacts_of_their
     assert (np.array(pushed[1::3]) == pushed[2::3]).all() and (other.qpos == same.qpos).all()
 
 
+@pytest.mark.parametrize(("aside_mm", "within_mm"), [(0.4, 1e-3), (0.8, 0.12)])
+def test_the_pressure_under_an_object_that_slides_goes_with_it(coro, aside_mm, within_mm):
+    """A box that was pressed and moved aside, flat and as deep as before, is held up under its middle.
+
+    By 0.8 mm it is pressed anew, on points of the surface that are 0.65 mm apart.
+    """
+    model = mujoco.MjModel.from_xml_string(scene(box(), collides=NO_CONTACT))
+    sensor, data = attach(model, "plate", coro, source="poses"), mujoco.MjData(model)
+    for x_mm in (0.0, aside_mm):
+        data.qpos[:3] = [1e-3 * x_mm, 0.0, 0.00995]
+        hand_back(data, [sensor])
+    force, moment = np.split(data.xfrc_applied[model.body("box").id], 2)
+    assert force[2] > 1.0 and np.abs(moment).max() < 1e-3 * within_mm * force[2]
+
+
 def test_a_gel_follows_the_object_of_each_state_alone(tmp_path):
     (tmp_path / "gel.yaml").write_text(SMALL_GEL)
     spec = mujoco.MjSpec.from_string(scene(box(0.2)))

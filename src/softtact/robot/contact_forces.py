@@ -9,7 +9,8 @@ The force is therefore that at the end of the step, linearly implicit (Euler, ba
 
 with the velocity V* that the step would give without the force, for all contacts of all sensors together. For K symmetric and not
 negative it is stable for every dt and every mass. At rest V+ = 0 and w+ = w, the force of the press. While an object moves by less
-than `_RENEWED` of its depth, w follows from K, and nothing is pressed.
+than `_RENEWED` of its depth, w follows from K, and nothing is pressed; pressures move aside and turn with the object, up to
+`_ASIDE_MM`.
 """
 
 from collections.abc import Sequence
@@ -29,6 +30,7 @@ from softtact.robot.geoms import MM, contact_force, contacts_of, name_of
 DAMPING_S = 0.002
 # Change of depth at any point under pressure, as a share and in mm, beyond which it is pressed.
 _RENEWED, _RENEWED_MM = 0.03, 2e-5
+_ASIDE_MM = 0.5                        # way along the sensor beyond which it is pressed: at a border less of it is under the object
 _POWER = 1.3                           # of depth in force, between a punch and a ball: for the stiffness, not for the force
 _LOADS = np.repeat([1.0, MM], 3)       # N and N mm in units of the engine
 
@@ -74,7 +76,7 @@ class _Contact:
 
     def load(self, here: tuple[np.ndarray, Rotation], friction: float) -> np.ndarray:
         """Force and moment (6,) on the object in a pose near that of the press."""
-        x, y = self.press.points_mm.T
+        x, y = (self.press.points_mm + self._ways(here)[:, :2]).T
         pressing = self.press.forces_n
         load = np.array([0.0, 0.0, pressing.sum(), y @ pressing, -x @ pressing, 0.0]) - self.stiffness @ _way(self.seen, here)
         self.stretch, self.last = self.stretch + _way(self.last, here), here
@@ -89,10 +91,23 @@ class _Contact:
             self.stretch = self.stretch * (bound / size)
         return load - self.aside @ self.stretch
 
+    @property
+    def now(self) -> np.ndarray:
+        """The stiffness (6, 6) where the object is now."""
+        along = np.eye(6)
+        x, y, _ = self.last[0] - self.seen[0]
+        along[[0, 1], 5], along[2, [3, 4]] = (-y, x), (y, -x)     # what a turn about the sensor's origin is at the old place
+        return along.T @ (self.stiffness + self.aside) @ along
+
     def has_moved(self, here: tuple[np.ndarray, Rotation]) -> bool:
-        """Whether the depth under pressure has changed so much that the object is pressed anew."""
-        sunk = np.abs(_motions(self.press.points_mm)[:, 2] @ _way(self.seen, here)).max(initial=0.0)
-        return bool(sunk > max(_RENEWED * self.reached_mm, _RENEWED_MM))
+        """Whether the depth under pressure, or the place of that, has changed so much that the object is pressed anew."""
+        ways = self._ways(here)
+        sunk, aside = np.abs(ways[:, 2]).max(initial=0.0), np.linalg.norm(ways[:, :2], axis=1).max(initial=0.0)
+        return bool(sunk > max(_RENEWED * self.reached_mm, _RENEWED_MM) or aside > _ASIDE_MM)
+
+    def _ways(self, here):
+        """Displacements (c, 3) in mm of the object at the points under pressure since it was pressed."""
+        return _motions(self.press.points_mm) @ _way(self.seen, here)
 
 
 def hand_back(data: Any, sensors: Sequence[AttachedSensor], *, damping_s: float = DAMPING_S) -> dict[str, np.ndarray]:
@@ -116,7 +131,7 @@ def hand_back(data: Any, sensors: Sequence[AttachedSensor], *, damping_s: float 
     loads, stiffness = np.concatenate([load for *_, load in found]), np.zeros((6 * len(found),) * 2)
     jacobian = np.concatenate([_jacobian(sensor, data, body) for sensor, body, *_ in found])
     for number, (_, _, contact, _) in enumerate(found):
-        stiffness[6 * number:6 * number + 6, 6 * number:6 * number + 6] = _in_metres(contact.stiffness + contact.aside)
+        stiffness[6 * number:6 * number + 6, 6 * number:6 * number + 6] = _in_metres(contact.now)
     solved = np.empty_like(jacobian)
     mujoco.mj_solveM(model, data, solved, jacobian)
     velocity = jacobian @ (data.qvel + dt * data.qacc)
