@@ -219,6 +219,19 @@ def test_the_stated_power_is_that_of_each_readouts_trainings_and_of_the_distance
     assert table.power_of_claim["detail", "gap"] == pytest.approx(table.power["detail"].prod() ** 4, rel=1e-4)
 
 
+def test_a_network_of_a_single_training_is_undecided_and_has_no_power(tmp_path):
+    scores = simulated(0.05)
+    found = verdicts(tables_of(scores[scores.seed == 0]))
+    assert found["detail"] == found["choice"] == {"undecided"}
+    assert verdicts(tables_of(scores[scores.seed == 0].assign(readout="gap")))["detail"] == {"holds"}
+    values = read_values("config/decide.yaml")
+    values["learning"]["printed"]["seeds"] = 1
+    made = next(job for job in jobs(load_study(values), tmp_path) if job.stage == "state_power")
+    state_power(inputs={}, outputs={"power": tmp_path / "power.csv"}, settings=made.settings)
+    table = pd.read_csv(tmp_path / "power.csv")
+    assert (table.power[table.readout == "printed"] == 0).all() and (table.power[table.readout != "printed"] > 0).all()
+
+
 def test_few_objects_are_undecided():
     assert all(words == {"undecided"} for words in verdicts(tables_of(simulated(0.05, objects=4))).values())
 

@@ -25,7 +25,7 @@ ELASTIC, ELECTRODES, MATCHED, FOUNDATION, HYPERELASTIC = MODELS = (
 CONTROLS = {"ceiling": HYPERELASTIC, "flipped": MATCHED}     # truths that are tested models
 INDENTERS = "indenters"
 FORMULAS = GAP, QUADRATIC = "gap", "quadratic"      # readouts that are fitted
-COMPACT, PRINTED = "compact", "printed"      # networks
+NETWORKS = COMPACT, PRINTED = "compact", "printed"
 
 
 class Pressing(Section):

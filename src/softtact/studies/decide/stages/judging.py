@@ -8,7 +8,7 @@ import pandas as pd
 
 from softtact.files import read_csv, read_dataset, read_json, write_csv
 from softtact.sensors.frusta import SensorSpec
-from softtact.studies.decide.config import MODELS
+from softtact.studies.decide.config import MODELS, NETWORKS
 from softtact.studies.decide.scoring import MEAN_READING, SCORES
 
 _FLAT = 0.05     # of the error: what it may fall by for twice as many maps, at the rate of the curve's last step, to count as flat
@@ -21,7 +21,7 @@ def state_power(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     power_of_claim, enough);  settings: statistics, smooth, stepped, seeds {readout: number}, tests (that share a claim's level)
     effect: the mean's distance from its bound. A hybrid that is as good as the hyperelastic model is by the margin above it. A
     choice is right where what it takes gains by the effect more than what it leaves, half of the objects each
-    others: objects of the second group, where two groups are compared
+    others: objects of the second group, where two groups are compared;  a network of one training is always undecided
     power: at half of the level, which one side has;  power_of_first: at that over the number of tests, as Holm's rule asks of
     the first one;  power_of_claim: of all tests of the claim together if they are independent;  enough: whether the power is
     what the statistics ask for
@@ -36,7 +36,8 @@ def state_power(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     for (claim, sizes), (readout, seeds) in product(groups.items(), settings["seeds"].items()):
         case = {"objects": sizes, "seeds": seeds, "object_sd": assumed["object_sd"], "seed_sd": assumed["seed_sd"]}
         effect = statistics["margin"] if claim == "balance" else assumed["effect"]
-        alone, first = (power(effect, level=0.5 * level / count, **case) for count in (1, tests))
+        alone, first = (0.0 if readout in NETWORKS and seeds < 2 else power(effect, level=0.5 * level / count, **case)
+                        for count in (1, tests))
         rows.append({"claim": claim, "readout": readout, **case, "objects": sizes[0], "others": sum(sizes[1:]), "effect": effect,
                      "tests": tests, "level": level, "power": alone, "power_of_first": first,
                      "enough": alone >= statistics["power"]})
