@@ -166,7 +166,7 @@ def _judged(table, tables, statistics, truths):
 
 
 def _verdict(row, p_values, statistics, shown, truths):
-    """The verdict of a row; details need a truth that contains them, stiffness a control, a cost no load of others, networks seeds."""
+    """The verdict of a row; details need a truth with them, stiffness a control, a cost no load of others, networks seeds."""
     if row.readout in NETWORKS and row.seeds < 2:      # how much another training differs is not known
         return UNDECIDED
     if row.claim in OF_DETAIL and row.truth in truths and shown.get(row.truth, 0) < statistics["least_shown"]:
