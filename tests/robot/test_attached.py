@@ -194,6 +194,12 @@ def test_a_depth_that_the_largest_force_does_not_reach_says_so(coro):
     assert not read_at(coro, box(), 9.5).validity_reason     # 0.5 mm: 38 N
 
 
+def test_an_object_wholly_below_the_surface_says_so_as_in_a_press_alone(coro):
+    plate = '<body name="coin" pos="0 0 0"><freejoint/><geom type="box" size=".003 .003 .0001" mass=".1"/></body>'
+    assert "coin: the object is 0.2 mm high, and its top is below the surface" in read_at(coro, plate, -0.15).validity_reason
+    assert not read_at(coro, plate, -0.05).validity_reason
+
+
 def test_an_object_beneath_the_board_does_not_touch(coro):
     reading = read_at(coro, box(), -2.6)     # the board is at -2.5 mm
     assert not reading.objects and not reading.force_n.any() and not reading.validity_reason

@@ -30,6 +30,7 @@ from softtact.press.kinds import layers_at_rest
 from softtact.press.making import layered_surface
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor, load_sensor
+from softtact.press.validity import flag_buried
 from softtact.readout.registry import readings_of
 from softtact.robot.events import set_down
 from softtact.robot.gels import GelReadings, has_gel
@@ -273,12 +274,12 @@ class AttachedSensor:
         state, last = np.array([*pose.translation_mm, *pose.rotation.as_quat(canonical=True), force_n]), self._bind(data).last
         if body not in last or _moved(last[body][0], state):
             mesh = self._mesh(body)
-            surface = HeightField(place(mesh, pose=set_down(mesh, pose)))
+            placed = place(mesh, pose=set_down(mesh, pose))
             try:
-                result = press_underside(self.sensor, surface, np.array([force_n]), model=self.press)
+                result = press_underside(self.sensor, HeightField(placed), np.array([force_n]), model=self.press)
             except (InputError, ConvergenceError) as error:
                 return None, str(error)
-            last[body] = state, with_expected_error(self.sensor, result)
+            last[body] = state, self._told(result, placed)
         return last[body][1], over
 
     @property
@@ -289,10 +290,15 @@ class AttachedSensor:
         """(`PressResult`, why it is not valid) of an object at its depth; its force before is the guess."""
         last = self._bind(data).last
         guess = float(last[body][1].normal_force_n[0]) if body in last else 0.1 * self.sensor.spec.force_range_n[1]
-        result = with_expected_error(self.sensor, self.press_depth(data, body, depth_mm, guess).result)
+        result = self._told(self.press_depth(data, body, depth_mm, guess).result, self._placed(data, body))
         last[body] = np.zeros(0), result
         wanted = min(depth_mm, self.sensor.spec.thickness_mm)
         return result, "" if result.indentation_mm[0] >= _REACHED * wanted else self._over
+
+    def _told(self, result, placed):
+        """A result with its expected error, and flagged where the object is wholly below the surface."""
+        result = flag_buried(result, float(placed.bounds[1, 2]) - first_touch_mm(self.sensor, HeightField(placed)))
+        return with_expected_error(self.sensor, result)
 
     def _reading(self, forces, pressed):
         """The sum of the presses of several objects."""
