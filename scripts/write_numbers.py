@@ -20,7 +20,8 @@ PERFORMANCE = ROOT / "docs" / "performance.md"
 EDGE, FAST, SOLID, VIRTUAL = (ROOT / "docs" / "explanation" / f"{name}.md"
                                for name in ("edge", "fast_models", "solid", "virtual_sensor"))
 LEARN = ROOT / "docs" / "how-to" / "learn_with_the_environment.md"
-POSE, DECIDE = (ROOT / "docs" / "how-to" / f"{name}.md" for name in ("find_a_pose_from_taxels", "decide_the_claims"))
+POSE, DECIDE, CALIBRATE = (ROOT / "docs" / "how-to" / f"{name}.md"
+                           for name in ("find_a_pose_from_taxels", "decide_the_claims", "calibrate"))
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
@@ -360,6 +361,15 @@ def poses() -> str:
             f"at most {read['budget']} presses.\n\n{table(head, rows)}")
 
 
+def calibration_places() -> str:
+    """What differences of presses and gradients cost, and how well they tell the map at a place beside."""
+    rows = [[row["model"], row["object"], *(f"{row[column]:.2g}" if row[column] is not None else ""
+             for column in ("differences_s", "gradient_s", "differences_left", "gradient_left"))]
+            for row in record("calibration_places")["rows"]]
+    head = "model, object, differences (s), gradient (s), differences: left, gradient: left"
+    return f"{source('calibration_places')}\n\n{table(head, rows)}"
+
+
 def numbers_page(counts: dict[str, int]) -> str:
     """The text of docs/reference/numbers.md."""
     parts = {"Tests": tests(counts), "Whole runs": whole_runs(), "Growth of a hyperelastic press with the sensor": growth(),
@@ -373,7 +383,7 @@ def pages() -> dict[Path, str]:
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
               FAST: {"batches": batches(), "batch": batch_on_gpu(), "choice": choice(), "expected error": expected_error(),
                      "other sensors": other_sensors()},
-              DECIDE: {"anchors": anchors()},
+              DECIDE: {"anchors": anchors()}, CALIBRATE: {"calibration places": calibration_places()},
               SOLID: {"races": solid_races(), "kernels": solid_kernels()},
               VIRTUAL: {"electrode field": electrode_field()}, POSE: {"poses": poses()},
               LEARN: {"environment": environment(), "vector environment": vector_environment()}}

@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 import trimesh
 from support.sensors import CORO
+from threadpoolctl import threadpool_info
 
 from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import ContactSettings, press_elastic
 from softtact.errors import InputError, ShellWarning
+from softtact.linalg.workers import threads_of_blas
 from softtact.models.elastic import compliance as elastic
 from softtact.models.elastic.gradient import PressedLayer
 from softtact.models.quarter_symmetry import ParityBlocks
@@ -69,6 +71,10 @@ def difference(press, step):
     """Central differences of the arrays of a result by a number."""
     upper, lower = press(step), press(-step)
     return {of: (getattr(upper, name) - getattr(lower, name)) / (2 * step) for of, name in ARRAYS.items()}
+
+
+def blas_threads():
+    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
 
 
 def error(found, wanted):
@@ -184,6 +190,19 @@ def test_the_margin_by_young_ends_where_a_point_loses_its_force_too(sensor, tigh
     touching = contact.force > 0
     nearest = (np.where(touching, contact.force, contact.gap) / np.abs(np.where(touching, force, gap))).min(axis=0)
     assert found.margin[0] == pytest.approx(nearest, rel=1e-3)
+
+
+def test_a_gradient_takes_one_thread_of_blas_and_leaves_the_others(sensor, monkeypatch):
+    seen, of_elastic = [], gradient._DIFFERENTIATED["elastic"]
+
+    def watched(*given):
+        seen.append(blas_threads())
+        return of_elastic(*given)
+
+    monkeypatch.setitem(gradient._DIFFERENTIATED, "elastic", watched)
+    with threads_of_blas(2):
+        pressed(sensor).gradient("depth", "force")
+        assert (seen, blas_threads()) == ([{1}], {2})
 
 
 def test_a_vector_times_the_gradient_is_the_gradient_of_the_product(sensor):

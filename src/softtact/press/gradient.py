@@ -22,6 +22,7 @@ from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.pose import Pose
+from softtact.linalg.workers import threads_of_blas
 from softtact.models.elastic.compliance import touch_object
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
 from softtact.models.foundation.compliance import FoundationCompliance
@@ -115,7 +116,7 @@ def gradient(result: "PressResult", of: str, by: str | Sequence[str]) -> Gradien
     press = _settled(result)
     _check_taxels(press.sensor, of)
     _check_contact(press)
-    return _gradient(press.model, of, names, *_DIFFERENTIATED[press.model](press, of, names))
+    return _gradient(press.model, of, names, *_differentiated(press.model, press, of, names))
 
 
 def gradient_of_batch(batch: "PressBatch", of: str, by: str | Sequence[str]) -> Gradient:
@@ -132,7 +133,7 @@ def gradient_of_batch(batch: "PressBatch", of: str, by: str | Sequence[str]) -> 
         try:
             press = _row(batch, number)
             _check_contact(press)
-            values[:, [number]], margin[:, [number]] = _DIFFERENTIATED[origin.model](press, of, names)
+            values[:, [number]], margin[:, [number]] = _differentiated(origin.model, press, of, names)
         except (ConvergenceError, InputError) as error:
             errors[number] = error.with_traceback(None)
     return _gradient(origin.model, of, names, values, margin, dict(sorted(errors.items())))
@@ -143,6 +144,12 @@ def _gradient(model, of, names, values, margin, errors=None):
     units = _UNITS | ({"young": "1"} if model == "foundation" else {})
     return Gradient(of, np.moveaxis(values, 0, -1), tuple(names), tuple(f"{_OF[of]}/{units[name]}" for name in names), margin.T,
                     errors or {})
+
+
+def _differentiated(model, press, of, names):
+    """Values and margins of a press; matrices of some hundred rows are not worth the waiting of BLAS' threads for each other."""
+    with threads_of_blas(1):
+        return _DIFFERENTIATED[model](press, of, names)
 
 
 def _parameters(of, by):

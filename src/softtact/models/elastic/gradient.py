@@ -3,7 +3,7 @@
 On these points  A f - depth = -gap0,  sum f = F.  With the set of points held, this is linear, so the rates of forces and depth by
 a number on which gaps, total force or compliance depend solve the same equations:
     A f' - depth' = -gap0' - A' f,    sum f' = F'
-A of each load step is factored once (Cholesky, in double precision): of the few hundred points of a usual contact that takes a
+A of each set of points is factored once (Cholesky, in double precision): of the few hundred points of a usual contact that takes a
 millisecond. Displacements depend on F / E, with Young's modulus E: d/dE = -(F / E) d/dF.
 """
 
@@ -44,8 +44,10 @@ class PressedLayer:
     def __init__(self, compliance: Compliance, points: ObjectPoints, contact: ContactLoadSteps) -> None:
         self._points, self._contact, self._active = points, contact, contact.force > 0
         self._among = compliance.among(points).astype(float)
-        self._factors = [sla.cho_factor(self._among[np.ix_(active, active)].T, overwrite_a=True, check_finite=False)
-                         for active in self._active.T]      # transposed, a symmetric matrix is overwritten without a copy
+        sets, number = np.unique(self._active.T, axis=0, return_inverse=True)      # a flat face has one at all forces
+        factors = [sla.cho_factor(self._among[np.ix_(active, active)].T, overwrite_a=True, check_finite=False)
+                   for active in sets]      # transposed, a symmetric matrix is overwritten without a copy
+        self._factors = [factors[one] for one in number]
 
     def by_gaps(self, gap_rates: np.ndarray) -> LayerPressRates:
         """By k numbers on which the gaps depend with rates (k, c) in mm."""
