@@ -2,11 +2,11 @@
 
     python benchmarks/calibration_places.py      (some minutes; writes benchmarks/results/calibration_places.json)
 
-The objects and forces of benchmarks/calibration.py, nine load steps each. Both ways give the change of the maps per mm along x and y
-and per degree. They are judged by what a fit needs: the map at a place drawn beside (0.4 mm, 0.4 mm, 1.5 degrees), predicted from
+The objects and forces of benchmarks/calibration.py, nine load steps each. Both ways give the change of the maps per mm along x and
+y and per degree. They are judged by what a fit needs: the map at a place drawn beside (0.4 mm, 0.4 mm, 1.5 degrees), predicted from
 the map at the stated one. The error of a prediction is over that of no prediction at all, so 1 is useless. Times are the
-processor's, both ways in turns. Expected: a gradient of the foundation model costs more than three presses, and its derivative, with
-the points under pressure held, predicts sharp edges worse than differences over half a millimetre.
+processor's, both ways in turns. Expected: a gradient of the foundation model costs more than three presses, and its derivative,
+with the points under pressure held, predicts sharp edges worse than differences over half a millimetre.
 """
 
 import time
@@ -35,7 +35,8 @@ def timed(function):
 def compared(sensor, model, number):
     """The row of one object."""
     mesh, place, levels = PRESSES[number]
-    centred, forces, place = placed_at(mesh, (0.0, 0.0, 0.0)), even_in_root(float(max(levels)), LEVELS), np.array(place, dtype=float)
+    centred, place = placed_at(mesh, (0.0, 0.0, 0.0)), np.array(place, dtype=float)
+    forces = even_in_root(float(max(levels)), LEVELS)
 
     def press(at, force_n=forces):
         x, y, angle = at

@@ -15,6 +15,7 @@ import trimesh
 from support.sensors import CORO
 from threadpoolctl import threadpool_info
 
+from softtact.contact.height_field import HeightField
 from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import ContactSettings, press_elastic
 from softtact.errors import InputError, ShellWarning
@@ -23,6 +24,8 @@ from softtact.models.elastic import compliance as elastic
 from softtact.models.elastic.gradient import PressedLayer
 from softtact.models.quarter_symmetry import ParityBlocks
 from softtact.press import gradient
+from softtact.press.batch import ObjectSurface, press_batch
+from softtact.press.fast import press_underside
 from softtact.press.objects import target_of
 from softtact.press.sensor import Sensor
 from softtact.sensors.fields import CalibrationBlock
@@ -192,17 +195,24 @@ def test_the_margin_by_young_ends_where_a_point_loses_its_force_too(sensor, tigh
     assert found.margin[0] == pytest.approx(nearest, rel=1e-3)
 
 
-def test_a_gradient_takes_one_thread_of_blas_and_leaves_the_others(sensor, monkeypatch):
-    seen, of_elastic = [], gradient._DIFFERENTIATED["elastic"]
-
-    def watched(*given):
-        seen.append(blas_threads())
-        return of_elastic(*given)
-
-    monkeypatch.setitem(gradient._DIFFERENTIATED, "elastic", watched)
+@pytest.mark.parametrize("run", [lambda sensor: pressed(sensor),
+                                 lambda sensor: press_batch(sensor, ObjectSurface(ellipsoid()), [POSE], 2.0),
+                                 lambda sensor: press_underside(sensor, HeightField(ellipsoid()), np.array(FORCES))],
+                         ids=["press", "batch", "underside"])
+def test_a_contact_takes_one_thread_of_blas_and_leaves_the_others(sensor, monkeypatch, run):
+    seen, contact_among = [], elastic._contact_among
+    monkeypatch.setattr(elastic, "_contact_among", lambda *given: seen.append(blas_threads()) or contact_among(*given))
     with threads_of_blas(2):
-        pressed(sensor).gradient("depth", "force")
-        assert (seen, blas_threads()) == ([{1}], {2})
+        run(sensor)
+        assert seen and all(one == {1} for one in seen) and blas_threads() == {2}
+
+
+def test_a_gradient_takes_one_thread_of_blas(sensor, monkeypatch):
+    seen, of_elastic, press = [], gradient._DIFFERENTIATED["elastic"], pressed(sensor)
+    monkeypatch.setitem(gradient._DIFFERENTIATED, "elastic", lambda *given: seen.append(blas_threads()) or of_elastic(*given))
+    with threads_of_blas(2):
+        press.gradient("depth", "force")
+    assert seen == [{1}]
 
 
 def test_a_vector_times_the_gradient_is_the_gradient_of_the_product(sensor):

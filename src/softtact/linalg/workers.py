@@ -3,14 +3,15 @@
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
-from functools import cache
-from typing import TypeVar
+from functools import cache, wraps
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+_Given = ParamSpec("_Given")
 
 
 class Workers:
@@ -36,6 +37,20 @@ SERIAL = Workers()
 def one_thread_each() -> AbstractContextManager:
     """A context in which BLAS runs on the thread that calls it: otherwise threads that call it wait for each other's threads."""
     return threads_of_blas(1)
+
+
+def on_one_thread(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """A function that runs BLAS on the thread that calls it.
+
+    The products of a fast press have some hundred rows. On idle cores a second thread saves next to nothing; where other programs
+    want the cores, the threads wait for each other in each product, and a press takes four times as long.
+    """
+    @wraps(function)
+    def run(*args: _Given.args, **kwargs: _Given.kwargs) -> _Result:
+        with one_thread_each():
+            return function(*args, **kwargs)
+
+    return run
 
 
 def threads_of_blas(count: int) -> AbstractContextManager:

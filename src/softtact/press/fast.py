@@ -16,6 +16,7 @@ from softtact.contact.underside import Underside
 from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
+from softtact.linalg.workers import on_one_thread
 from softtact.models.elastic.compliance import LayerPress, press_object
 from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
@@ -173,6 +174,7 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, c
     return _on_foundation(sensor, near, forces, control, start)
 
 
+@on_one_thread
 def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, control: RunControl, start: float) -> PressResult:
     """The result for an object by its underside, which is near the sensing surface."""
     compliance = sensor.prepared("foundation")

@@ -22,7 +22,7 @@ from softtact.contact.undersides import underside_of
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.pose import Pose
-from softtact.linalg.workers import threads_of_blas
+from softtact.linalg.workers import on_one_thread
 from softtact.models.elastic.compliance import touch_object
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
 from softtact.models.foundation.compliance import FoundationCompliance
@@ -146,10 +146,10 @@ def _gradient(model, of, names, values, margin, errors=None):
                     errors or {})
 
 
+@on_one_thread
 def _differentiated(model, press, of, names):
-    """Values and margins of a press; matrices of some hundred rows are not worth the waiting of BLAS' threads for each other."""
-    with threads_of_blas(1):
-        return _DIFFERENTIATED[model](press, of, names)
+    """Values and margins of a press."""
+    return _DIFFERENTIATED[model](press, of, names)
 
 
 def _parameters(of, by):

@@ -15,7 +15,7 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
 from softtact.geometry.meshes import check_over_sensor, default_pose, place
-from softtact.linalg.workers import threads_of_blas
+from softtact.linalg.workers import on_one_thread
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
 from softtact.press import choice
@@ -89,7 +89,7 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
     if sensor.spec.edge.far and model == "elastic":
         return _on_gel(sensor, task)
     if _by_force_alone(task.motion):
-        return _by_forces(sensor, task, choice.PRESSES[model], threads=task.control.threads if model == "elastic" else 1)
+        return _by_forces(sensor, task, choice.PRESSES[model])
     motions = {"elastic": press_elastic_motion, "hyperelastic": choice.press_hyperelastic}
     if model not in motions:
         raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic, hyperelastic or "
@@ -97,7 +97,7 @@ def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResul
     if task.motion.turns or task.motion.loaded_aside:
         raise InputError(f"model={model!r}: the {model} model neither turns an object nor loads it aside; use model='solid' for "
                          "this motion.")
-    return _by_motion(sensor, task, motions[model], threads=task.control.threads if model == "elastic" else 1)
+    return _by_motion(sensor, task, motions[model])
 
 
 def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
@@ -145,7 +145,8 @@ def _by_force_alone(motion):
     return motion.forces_n is not None or motion.times_s is not None and motion.held_forces_n is not None
 
 
-def _by_forces(sensor, task, press, *, threads=1):
+@on_one_thread
+def _by_forces(sensor, task, press):
     """A press straight down by increasing forces; with durations, over time."""
     complete = None
     if (motion := task.motion).times_s is not None:
@@ -160,12 +161,11 @@ def _by_forces(sensor, task, press, *, threads=1):
         return complete(result) if complete else replace(result, origin=origin)
 
     task.control.reached.finish = finished
-    # With more threads, dense products of some hundred rows wait for each other and take up to five times as long.
-    with threads_of_blas(threads):
-        return task.control.reached.finish(press(sensor, placed, forces, task.control))
+    return task.control.reached.finish(press(sensor, placed, forces, task.control))
 
 
-def _by_motion(sensor, task, press, *, threads=1):
+@on_one_thread
+def _by_motion(sensor, task, press):
     """A press along a motion other than straight down by increasing forces."""
     times = refuse_creep(sensor.spec, task.motion)
     placed, finish = _placed(sensor, task)
@@ -175,8 +175,7 @@ def _by_motion(sensor, task, press, *, threads=1):
         return result if times is None else replace(result, time_s=times[:result.steps])
 
     task.control.reached.finish = finished
-    with threads_of_blas(threads):
-        return task.control.reached.finish(press(sensor, placed, task.motion, task.control))
+    return task.control.reached.finish(press(sensor, placed, task.motion, task.control))
 
 
 def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callable[[PressResult], PressResult]]:

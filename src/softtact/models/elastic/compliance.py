@@ -22,6 +22,7 @@ from softtact.contact.undersides import PosedUnderside
 from softtact.contact.unilateral import REACH, RISE, ContactLoadSteps, depth_on_springs, press_elastic
 from softtact.errors import ConvergenceError
 from softtact.files import read_arrays
+from softtact.linalg.workers import on_one_thread
 from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, of_parities
 from softtact.sensors.base import BaseSpec
 from softtact.sensors.fields import ElasticLayer
@@ -265,6 +266,7 @@ def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence
     return _with_fields(compliance, points, _contact_among(compliance, points, patches)(forces_n))
 
 
+@on_one_thread
 def press_object(compliance: Compliance, underside: PosedUnderside, forces_n: np.ndarray, *,
                  patches: bool = False) -> tuple[ObjectPoints, LayerPress]:
     """The `LayerPress` of an object that comes down through rising forces (l,) in N, at most to the shell, and its points.
@@ -276,6 +278,7 @@ def press_object(compliance: Compliance, underside: PosedUnderside, forces_n: np
     return points, _with_fields(compliance, points, contact)
 
 
+@on_one_thread
 def touch_object(compliance: Compliance, underside: PosedUnderside, forces_n: np.ndarray, *,
                  patches: bool = False) -> tuple[ObjectPoints, ContactLoadSteps]:
     """The contact of `press_object` and its points.
