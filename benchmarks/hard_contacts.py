@@ -33,7 +33,7 @@ from softtact.press.foretelling import foretell
 from softtact.press.sensor import load_sensor
 from softtact.press.validity import BETWEEN
 
-SEED = {"trial": 1, "judged": 20261204}
+SEED = {"trial": 1, "judged": 20261205}
 FORCES_N = np.array([5.0, 10.0, 20.0])
 LARGEST_TILT = 45.0
 GROWTH = 1.25      # of load steps beyond the force from which frusta may be crushed
