@@ -41,7 +41,7 @@ def test_the_paper_study_costs_710_presses_of_each_model_and_less_than_two_days(
     assert f"needs {hours['']:.0f} core hours, {hours['search'] + hours['train_cnn']:.0f} of them" in Path(
         "docs/performance.md").read_text(encoding="utf-8")
     lines = list(cost_lines(opened.name, costs.values(), origin=origin_of(opened, read_costs()), cores=2))
-    assert "at most 41 hours on 2 cores" in lines[-1] and len(lines) == len(costs) + 3
+    assert "at most 42 hours on 2 cores" in lines[-1] and len(lines) == len(costs) + 3
 
 
 def test_the_presses_of_the_deciding_study_cost_what_they_took():
@@ -58,7 +58,7 @@ def test_the_tiny_study_costs_minutes_and_more_load_steps_cost_more():
     _, costs = costs_of("tiny")
     assert sum(cost.hours for cost in costs.values()) < 0.5
     each = costs_of("paper")[1]["simulate_press, hyperelastic"].each_s
-    assert each > 3 * costs["simulate_press, hyperelastic"].each_s
+    assert each > 2 * costs["simulate_press, hyperelastic"].each_s
 
 
 def test_finished_jobs_are_not_counted_and_the_studys_own_times_come_first(tmp_path):
