@@ -23,9 +23,8 @@ from softtact.linalg.workers import threads_of_blas
 from softtact.models.elastic import compliance as elastic
 from softtact.models.elastic.gradient import PressedLayer
 from softtact.models.quarter_symmetry import ParityBlocks
-from softtact.press import gradient
+from softtact.press import fast, gradient
 from softtact.press.batch import ObjectSurface, press_batch
-from softtact.press.fast import press_underside
 from softtact.press.objects import target_of
 from softtact.press.sensor import Sensor
 from softtact.sensors.fields import CalibrationBlock
@@ -197,7 +196,7 @@ def test_the_margin_by_young_ends_where_a_point_loses_its_force_too(sensor, tigh
 
 @pytest.mark.parametrize("run", [lambda sensor: pressed(sensor),
                                  lambda sensor: press_batch(sensor, ObjectSurface(ellipsoid()), [POSE], 2.0),
-                                 lambda sensor: press_underside(sensor, HeightField(ellipsoid()), np.array(FORCES))],
+                                 lambda sensor: fast.press_underside(sensor, HeightField(ellipsoid()), np.array(FORCES))],
                          ids=["press", "batch", "underside"])
 def test_a_contact_takes_one_thread_of_blas_and_leaves_the_others(sensor, monkeypatch, run):
     seen, contact_among = [], elastic._contact_among
@@ -206,6 +205,19 @@ def test_a_contact_takes_one_thread_of_blas_and_leaves_the_others(sensor, monkey
         before = blas_threads()     # a library that another test loaded later keeps its own
         run(sensor)
         assert 2 in before and seen and all(one == {1} for one in seen) and blas_threads() == before
+
+
+def test_a_slide_takes_one_thread_of_blas(sensor, monkeypatch):
+    class Begun(Exception):
+        pass
+
+    def begin(*_, **__):
+        raise Begun(blas_threads())
+
+    monkeypatch.setattr(fast, "move_elastic", begin)
+    with threads_of_blas(2), pytest.raises(Begun) as begun:
+        sensor.press(ellipsoid(), pose=POSE, motion="fz -1; x 0.1 in 1", model="elastic", label="")
+    assert begun.value.args == ({1},)
 
 
 def test_a_gradient_takes_one_thread_of_blas(sensor, monkeypatch):
