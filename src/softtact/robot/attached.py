@@ -275,11 +275,12 @@ class AttachedSensor:
         if body not in last or _moved(last[body][0], state):
             mesh = self._mesh(body)
             placed = place(mesh, pose=set_down(mesh, pose))
+            surface = HeightField(placed)
             try:
-                result = press_underside(self.sensor, HeightField(placed), np.array([force_n]), model=self.press)
+                result = press_underside(self.sensor, surface, np.array([force_n]), model=self.press)
             except (InputError, ConvergenceError) as error:
                 return None, str(error)
-            last[body] = state, self._told(result, placed)
+            last[body] = state, self._judged(result, placed.bounds[1, 2] - first_touch_mm(self.sensor, surface))
         return last[body][1], over
 
     @property
@@ -290,15 +291,15 @@ class AttachedSensor:
         """(`PressResult`, why it is not valid) of an object at its depth; its force before is the guess."""
         last = self._bind(data).last
         guess = float(last[body][1].normal_force_n[0]) if body in last else 0.1 * self.sensor.spec.force_range_n[1]
-        result = self._told(self.press_depth(data, body, depth_mm, guess).result, self._placed(data, body))
+        result = self._judged(self.press_depth(data, body, depth_mm, guess).result,
+                              self._placed(data, body).bounds[1, 2] + depth_mm)
         last[body] = np.zeros(0), result
         wanted = min(depth_mm, self.sensor.spec.thickness_mm)
         return result, "" if result.indentation_mm[0] >= _REACHED * wanted else self._over
 
-    def _told(self, result, placed):
-        """A result with its expected error, and flagged where the object is wholly below the surface."""
-        result = flag_buried(result, float(placed.bounds[1, 2]) - first_touch_mm(self.sensor, HeightField(placed)))
-        return with_expected_error(self.sensor, result)
+    def _judged(self, result, height_mm):
+        """A result with its expected error, and flagged where an object of this height is wholly below the surface."""
+        return with_expected_error(self.sensor, flag_buried(result, float(height_mm)))
 
     def _reading(self, forces, pressed):
         """The sum of the presses of several objects."""
