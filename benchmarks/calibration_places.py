@@ -5,8 +5,8 @@
 The objects and forces of benchmarks/calibration.py, nine load steps each. Both ways give the change of the maps per mm along x and
 y and per degree. They are judged by what a fit needs: the map at a place drawn beside (0.4 mm, 0.4 mm, 1.5 degrees), predicted from
 the map at the stated one. The error of a prediction is over that of no prediction at all, so 1 is useless. Times are the
-processor's, one way after the other. Expected: a gradient of the foundation model costs more than three presses, and its derivative,
-with the points under pressure held, predicts sharp edges worse than differences over half a millimetre.
+processor's, one way after the other. Expected: a gradient of the foundation model costs more than three presses, and its
+derivative, with the points under pressure held, predicts sharp edges worse than differences over half a millimetre.
 """
 
 import time

@@ -43,7 +43,8 @@ def on_one_thread(function: Callable[_Given, _Result]) -> Callable[_Given, _Resu
     """A function that runs BLAS on the thread that calls it.
 
     The products of a fast press have some hundred rows. On idle cores a second thread saves next to nothing; where other programs
-    want the cores, the threads wait for each other in each product, and a press takes four times as long.
+    want the cores, the threads wait for each other in each product: a press takes up to twice as long, a gradient four times
+    (`benchmarks/busy_cores.py`), and more beside programs that use much memory.
     """
     @wraps(function)
     def run(*args: _Given.args, **kwargs: _Given.kwargs) -> _Result:
