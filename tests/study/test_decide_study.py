@@ -18,7 +18,7 @@ from softtact.geometry.generated import draw_objects
 from softtact.press.sensor import Sensor
 from softtact.studies.configuration import found_sensor
 from softtact.studies.decide.claims import claims_of_decision
-from softtact.studies.decide.config import COMPACT, MODELS, PRINTED, load_study, read_values
+from softtact.studies.decide.config import COMPACT, CONTROLS, MODELS, PRINTED, load_study, read_values
 from softtact.studies.decide.hypotheses import FAMILIES, Tables, hypothesis_table, shown_objects
 from softtact.studies.decide.jobs import jobs
 from softtact.studies.decide.policies import policy_scores
@@ -54,10 +54,18 @@ def test_every_training_of_the_printed_network_is_a_job_and_all_scores_are_gathe
     learned = [job for job in made if job.stage == "learn"]
     seeds = {name: sorted(seed for job in learned if job.settings["architecture"] == name and job.settings["truth"] == "a"
                           and job.settings["model"] == "elastic" for seed in job.settings["seeds"]) for name in (COMPACT, PRINTED)}
-    assert seeds == {COMPACT: [0, 1, 2, 3, 4], PRINTED: [0, 1, 2]} and len(learned) == 2 * len(MODELS) * (1 + 3)
+    assert seeds == {COMPACT: [0, 1, 2, 3, 4], PRINTED: [0, 1, 2]} and len(learned) == len(MODELS) * (4 * 1 + 2 * 3)
     gathered = next(job for job in made if job.stage == "gather_scores")
     scores = [job.made()["scores"] for job in learned]
     assert sorted(gathered.inputs["networks"]) == sorted(scores) and len(set(scores)) == len(scores)
+
+
+def test_only_a_network_that_asks_for_them_is_trained_on_the_controls(tmp_path):
+    made = jobs(load_study(read_values("config/decide.yaml")), tmp_path)
+    truths = {name: {job.settings["truth"] for job in made if job.stage == "learn" and job.settings["architecture"] == name}
+              for name in (COMPACT, PRINTED)}
+    assert truths == {COMPACT: {"a", "b", *CONTROLS}, PRINTED: {"a", "b"}}
+    assert {job.settings["truth"] for job in made if job.stage == "trace_curve"} == {"a", "b"}
 
 
 def test_the_steps_are_spread_over_their_range():

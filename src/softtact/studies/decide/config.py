@@ -70,6 +70,7 @@ class Trainings(Section):
     epochs: PositiveInt
     batch: PositiveInt
     learning_rate: PositiveFloat
+    controls: bool = Field(False, description="whether it is trained on the controls' readings, too")
 
 
 class Learning(Section):
@@ -81,6 +82,10 @@ class Learning(Section):
     printed: Trainings | None = Field(None, description="the paper's network; null: none")
     curve: list[Share] = Field(description="shares of the training indenters at which the compact network is trained anew")
     device: Literal["auto", "cpu", "cuda"] = "auto"
+
+    def truths_of(self, trained: Trainings) -> list[str]:
+        """Whose readings a network is trained on, in order."""
+        return list(dict.fromkeys([*self.truths, *(CONTROLS if trained.controls else [])]))
 
 
 class Assumed(Section):

@@ -149,22 +149,27 @@ class _Jobs:
         if plan.printed is not None:      # one takes minutes: each is a job of its own
             trainings += [(f"{PRINTED}_{seed}", PRINTED, plan.printed, [seed]) for seed in range(plan.printed.seeds)]
         made = []
-        for about in [{"truth": truth, "model": model} for truth in plan.truths for model in MODELS]:
-            for network, architecture, trained, seeds in trainings:
-                settings, work = self._training(architecture, trained, len(seeds))
-                made.append(Job("learn", self.maps(about["truth"]), {"scores": f"{learned}_{{network}}.csv"},
-                                about | settings | {"seeds": seeds}, about | {"network": network}, work))
-            settings, work = self._training(COMPACT, plan.compact, len(plan.curve))
-            made.append(Job("trace_curve", self.maps(about["truth"]), {"curve": f"{learned}_curve.csv"},
-                            about | settings | {"shares": plan.curve}, about, work))
+        for network, architecture, trained, seeds in trainings:
+            settings, work = self._training(architecture, trained, len(seeds))
+            made += [Job("learn", self.maps(about["truth"]), {"scores": f"{learned}_{{network}}.csv"},
+                         about | settings | {"seeds": seeds}, about | {"network": network}, work)
+                     for about in self._pairs(plan.truths_of(trained))]
+        settings, work = self._training(COMPACT, plan.compact, len(plan.curve))
+        made += [Job("trace_curve", self.maps(about["truth"]), {"curve": f"{learned}_curve.csv"},
+                     about | settings | {"shares": plan.curve}, about, work) for about in self._pairs(plan.truths)]
         return made
+
+    @staticmethod
+    def _pairs(truths: Sequence[str]) -> list[dict[str, str]]:
+        """Each truth with each tested model."""
+        return [{"truth": truth, "model": model} for truth in truths for model in MODELS]
 
     def _training(self, architecture: str, trained: Trainings, times: int) -> tuple[dict[str, Any], dict[str, float]]:
         """Settings of a job that trains an architecture some times, and its work."""
         plan = self.values.learning
         settings = {"architecture": architecture, "seed": self.values.seed, "device": plan.device,
                     "validation_share": plan.validation_share, "ssim_window": self.values.ssim_window,
-                    "scored": self.values.scored, "trained": trained.model_dump(mode="json", exclude={"seeds"})}
+                    "scored": self.values.scored, "trained": trained.model_dump(mode="json", exclude={"seeds", "controls"})}
         return settings, {f"{architecture}_maps": len(self.study.indenters) * len(self.forces) * trained.epochs * times}
 
     def judging(self) -> list[Job]:
