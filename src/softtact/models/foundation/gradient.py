@@ -6,7 +6,9 @@ loads r, lateral loads l, lifts e by rocking, and gaps s by nodes that move side
     extension(q) - w - e = 0                        at standing frusta,         r, l, e, s = effects(f, q, r, l)
 A number changes them by minus the tangent's inverse times the change of these residuals. The contact's tangent is Newton's,
 factored once; the effects are found with GMRES (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856) about it, those by
-several numbers as one vector, so that a product reads the compliance once for all: arrays have a first axis for the numbers. The
+several numbers as one vector, so that a product reads the compliance once for all: arrays have a first axis for the numbers. GMRES
+takes products in single precision, which read half as much, and what it leaves is refined in double (Carson and Higham, SIAM J.
+Sci. Comput. 40 (2018) A817). The
 solver leaves gaps of some micrometres, as it seldom updates where nodes lie under the object, so Newton's method settles the
 balance.
 
@@ -15,6 +17,7 @@ share of a point's surroundings that the object covers.
 """
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -27,8 +30,11 @@ from softtact.errors import ConvergenceError
 from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places, Sideways
 from softtact.models.foundation.solve import SettledContact, membrane_loads
+from softtact.models.quarter_symmetry import ParityProduct
 
-_RELATIVE, _ROUNDS, _RESTART = 1e-8, 10, 40     # of GMRES
+_ROUNDS, _RESTART = 10, 40     # of GMRES
+_OF_RATES, _OF_STEPS = 1e-8, 1e-3     # what is left of the effects in rates, and in steps of Newton's method
+_OF_ROUNDS = 1e-4     # what a round of GMRES leaves: its products are in single precision
 _NEWTON, _SETTLED = 30, 1e-6     # steps at most, and a patch's change of force over the total force that ends them
 _REMEDY = "ask for gradients of smaller forces, or of the elastic model."
 _COUPLED = np.array([[0.0, 1.0], [1.0, 0.0]])     # of displacement and tilt of a root by pressure
@@ -81,6 +87,21 @@ class Rates:
         return [Rates(*one) for one in parts]
 
 
+class _Rounded:
+    """A compliance in single precision as a factor of loads that are rounded to it."""
+
+    __array_ufunc__ = None     # so that `forces @ G` comes here
+
+    def __init__(self, compliance: ParityProduct) -> None:
+        self._compliance = compliance
+
+    def __matmul__(self, loads: np.ndarray) -> np.ndarray:
+        return self._compliance @ loads.astype(np.float32)
+
+    def __rmatmul__(self, forces: np.ndarray) -> np.ndarray:
+        return forces.astype(np.float32) @ self._compliance
+
+
 class Balance:
     """The balance of a settled press of `ObjectPoints` on a compliance, in double precision; `of` another load step of it."""
 
@@ -90,9 +111,10 @@ class Balance:
         surface, at = self.places.surface().astype(float), contact.patch
         both = np.vstack([at @ surface[:self.nodes], -surface[self.nodes:]])
         self._hard = np.hstack([(at @ both[:, :self.nodes].T).T, -both[:, self.nodes:]])
-        self._lateral, self._lateral_self, self._membrane = (
-            one.astype(float) for one in (self.places.lateral(), self.places.lateral_self(), self.places.membrane()))
-        self._sideways = Sideways(compliance, points, self.places)
+        self._stored = [self.places.lateral(), self.places.lateral_self(), self.places.membrane()]
+        products: list[ParityProduct | _Rounded] = [one.astype(float) for one in self._stored]
+        self._lateral, self._lateral_self, self._membrane = products
+        self._sideways: Callable[[np.ndarray], np.ndarray] = Sideways(compliance, points, self.places)
         self._at(contact)
 
     def _at(self, contact):
@@ -104,6 +126,13 @@ class Balance:
         """The balance of another load step of the same press."""
         other = copy.copy(self)
         other._at(contact)
+        return other
+
+    def rounded(self) -> Self:
+        """The balance with products in single precision."""
+        other = copy.copy(self)
+        other._lateral, other._lateral_self, other._membrane = map(_Rounded, self._stored)
+        other._sideways = lambda load: self._sideways(load.astype(np.float32))
         return other
 
     @property
@@ -121,12 +150,19 @@ class Balance:
         return np.concatenate([at.force @ self.patch, -(at.q + at.loads)], axis=-1)
 
     def _moved(self, at):
-        """Displacements (..., c + b) of patches downwards and frusta upwards, and roots (..., b, axis, displacement or tilt)."""
-        down, load = at.lateral @ self._lateral, self.load(at)
+        """Displacements (..., c + b) of patches downwards and frusta upwards."""
+        return self._moved_by_effects(at) + at.force @ self.matrix[:, :self.patches].T + at.q @ self.matrix[:, self.patches:].T
+
+    def _moved_by_effects(self, at):
+        """The part of `_moved` that comes from loads and lateral loads."""
+        down = at.lateral @ self._lateral
         seen = np.concatenate([down[..., :self.nodes] @ self.patch.T, -down[..., self.nodes:]], axis=-1)
-        roots = (self._lateral @ load.T + self._lateral_self @ at.lateral.T).T
-        moved = np.concatenate([at.force, at.q + at.loads], axis=-1) @ self.matrix.T + seen
-        return moved, np.moveaxis(roots.reshape(*load.shape[:-1], 2, 2, -1), -1, -3)
+        return seen + at.loads @ self.matrix[:, self.patches:].T
+
+    def _roots(self, at):
+        """Displacements and tilts of roots (..., b, axis, displacement or tilt)."""
+        roots = (self._lateral @ self.load(at).T + self._lateral_self @ at.lateral.T).T
+        return np.moveaxis(roots.reshape(*at.lateral.shape[:-1], 2, 2, -1), -1, -3)
 
     def _on_lattice(self, moved):
         """Descents (..., ny, nx) of the frusta."""
@@ -138,11 +174,11 @@ class Balance:
 
     def gaps(self, at: Unknowns, gap_mm: np.ndarray) -> np.ndarray:
         """Gaps (c,) in mm of patches whose points have the gaps gap_mm (n,) at depth 0."""
-        return self.patch @ gap_mm + at.shift - at.depth + self._moved(at)[0][:self.patches]
+        return self.patch @ gap_mm + at.shift - at.depth + self._moved(at)[:self.patches]
 
     def residual(self, at: Unknowns, gap_mm: np.ndarray, force_n: float) -> Unknowns:
         """Residuals of the equations for points with gaps gap_mm (n,) at depth 0 under a force in N, the active sets held."""
-        (moved, roots), law = self._moved(at), self.law
+        moved, roots, law = self._moved(at), self._roots(at), self.law
         down = -moved[self.patches:]
         touching = np.where(self.contact.touching, self.gaps(at, gap_mm), at.force)
         standing = np.where(self.contact.standing, law.extension(at.q) - down - at.rise, at.q)
@@ -156,7 +192,7 @@ class Balance:
 
     def active_sets(self, at: Unknowns, gap_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which patches (c,) touch and which frusta (b,) stand after the present ones of these pull or overlap."""
-        contact, lifted = self.contact, self._moved(at)[0][self.patches:] - at.rise
+        contact, lifted = self.contact, self._moved(at)[self.patches:] - at.rise
         return (np.where(contact.touching, at.force > 0, contact.possible & (self.gaps(at, gap_mm) < 0)),
                 np.where(contact.standing, at.q > 0, lifted < 0))
 
@@ -182,14 +218,15 @@ class Tangent:
         self.balance, self.at = balance, at
         contact, law = balance.contact, balance.law
         self._touching, self._standing = np.flatnonzero(contact.touching), np.flatnonzero(contact.standing)
-        moved, self._roots = balance._moved(self.at)
-        self._down, self._membrane = balance._on_lattice(moved), balance._membrane_forces(self.at)
+        self._down, self._roots = balance._on_lattice(balance._moved(self.at)), balance._roots(self.at)
+        self._membrane = balance._membrane_forces(self.at)
         self._slope = law.slope(self.at.q)
         more, self._growth = law.stiffening(self.at.q)
         self._stiffness = more - self.at.q[:, None, None] * _COUPLED
         self._curving = law.stiffening_rate(self.at.q)
         rows = np.concatenate([self._touching, balance.patches + self._standing])
-        matrix = balance.matrix[np.ix_(rows, rows)]
+        self._by_active = balance.matrix[:, rows]
+        matrix = self._by_active[rows]
         frusta = np.arange(len(self._touching), len(rows))
         matrix[frusta, frusta] += self._slope[self._standing]
         self._factor = sla.cho_factor(matrix, check_finite=False)
@@ -227,7 +264,7 @@ class Tangent:
 
     def _by(self, change):
         found = self.solve(change)
-        moving, c = self.balance._moved(found)[0], self.balance.patches
+        moving, c = self.balance._moved(found), self.balance.patches
         opening = change.force + found.shift - found.depth[..., None] + moving[..., :c]
         lifting = change.q + moving[..., c:] - found.rise
         return Rates(found.depth, self.balance.load(found), found.lateral, self._margin(found, opening, lifting), found,
@@ -238,7 +275,7 @@ class Tangent:
         """Of the balance at points with gaps gap_mm (n,) at depth 0 under a force in N, from the solver's load step on."""
         tangent = cls(balance, balance.unknowns)
         for _ in range(_NEWTON):
-            step = tangent.solve(balance.residual(tangent.at, gap_mm, force_n))
+            step = tangent.solve(balance.residual(tangent.at, gap_mm, force_n), _OF_STEPS)
             at = tangent.at.plus(step)
             touching, standing = balance.active_sets(at, gap_mm)
             same = np.array_equal(touching, balance.contact.touching) and np.array_equal(standing, balance.contact.standing)
@@ -248,24 +285,23 @@ class Tangent:
                 return tangent
         raise ConvergenceError(f"The gradient of the foundation model did not settle its balance at {force_n:g} N; {_REMEDY}")
 
-    def _contact(self, effects, change):
-        """Rates of force, q and depth for those of the effects, with the residuals' `change` of the contact balanced."""
-        balance, c, touching, standing = self.balance, self.balance.patches, self._touching, self._standing
+    def _contact(self, balance, effects, change):
+        """Rates of all unknowns, and of `Balance._moved`, for those of the effects, with the residuals' `change` balanced."""
+        c, touching, standing = balance.patches, self._touching, self._standing
         nothing = balance.nothing(*effects[0].shape[:-1])
         still = Unknowns(nothing.force, nothing.q, nothing.depth, *effects)
-        moved = balance._moved(still)[0]
+        moved = balance._moved_by_effects(still)
         right = np.concatenate([-(change.force + still.shift + moved[..., :c])[..., touching],
                                 (-change.q - moved[..., c:] + still.rise)[..., standing]], axis=-1)
         at_rest = sla.cho_solve(self._factor, right.T, check_finite=False).T
         depth = (-change.depth - at_rest @ self._ones) / (self._ones @ self._per_depth)
         both = at_rest + depth[..., None] * self._per_depth
         still.force[..., touching], still.q[..., standing] = np.split(both, [len(touching)], axis=-1)
-        return replace(still, depth=depth)
+        return replace(still, depth=depth), moved + both @ self._by_active.T
 
-    def _effects(self, rate):
-        """Rates of loads, lateral loads, rise and shift that follow from those of all unknowns."""
-        balance, law = self.balance, self.balance.law
-        moved, roots = balance._moved(rate)
+    def _effects(self, balance, rate, moved):
+        """Rates of loads, lateral loads, rise and shift that follow from those of all unknowns and of `Balance._moved`."""
+        law, roots = balance.law, balance._roots(rate)
         by_q = rate.q * self._slope      # of the compression
         loads = (membrane_loads(balance._on_lattice(moved), self._membrane)
                  + membrane_loads(self._down, balance._membrane_forces(rate)))
@@ -280,26 +316,34 @@ class Tangent:
         rise = law.rise_rate(np.hypot(*aside.T), self.at.q, sideways, rate.q)
         return loads.reshape(pushed.shape) + pushed, lateral, rise, balance.shift(rate)
 
-    def solve(self, change: Unknowns) -> Unknowns:
-        """Rates of the unknowns at which rates `change` of the residuals are balanced."""
-        sizes, nothing = np.cumsum([one.shape[-1] for one in self._split(change)[:3]]), self.balance.nothing()
-        start = self._contact(self._split(self.balance.nothing(*change.force.shape[:-1])), change)
-        right = np.concatenate(self._effects(start), axis=-1) - np.concatenate(self._split(change), axis=-1)
-        scale = np.concatenate([np.full(one.shape[-1], size)
-                                for one, size in zip(self._split(change), self._sizes(), strict=True)])
-        length = np.maximum(np.linalg.norm(right / scale, axis=-1, keepdims=True), np.finfo(float).tiny)     # of each number's
+    def solve(self, change: Unknowns, left: float = _OF_RATES) -> Unknowns:
+        """Rates of the unknowns at which rates `change` of the residuals are balanced, but for a share `left` of the effects."""
+        balance, rounded = self.balance, self.balance.rounded()
+        sizes, nothing = np.cumsum([one.shape[-1] for one in self._split(change)[:3]]), balance.nothing()
+        scale = np.repeat(self._sizes(), np.diff([0, *sizes, sizes[-1] + change.shift.shape[-1]]))
+        start = self._contact(balance, self._split(balance.nothing(*change.force.shape[:-1])), change)
+        right = (np.concatenate(self._effects(balance, *start), axis=-1) - np.concatenate(self._split(change), axis=-1)) / scale
+        right /= np.maximum(length := np.linalg.norm(right, axis=-1, keepdims=True), np.finfo(float).tiny)     # of each number's
 
-        def missing(x):
+        def missing(balance, x):
             effects = x.reshape(right.shape) * scale
-            follow = self._effects(self._contact(np.split(effects, sizes, axis=-1), nothing))
+            follow = self._effects(balance, *self._contact(balance, np.split(effects, sizes, axis=-1), nothing))
             return ((effects - np.concatenate(follow, axis=-1)) / scale).ravel()
 
-        operator = LinearOperator((right.size,) * 2, matvec=missing, dtype=float)
-        x, failed = gmres(operator, (right / scale / length).ravel(), rtol=_RELATIVE, atol=0.0, restart=_RESTART, maxiter=_ROUNDS)
-        if failed:
-            force_n = self.balance.contact.load_step.force_n
+        operator = LinearOperator((right.size,) * 2, matvec=lambda x: missing(rounded, x), dtype=float)
+        x, remaining, enough = np.zeros(right.size), right.ravel(), left * np.linalg.norm(right)
+        for _ in range(_ROUNDS):
+            step, failed = gmres(operator, remaining, rtol=max(left, _OF_ROUNDS), atol=enough, restart=_RESTART, maxiter=_ROUNDS)
+            x += step
+            if not failed and left >= _OF_ROUNDS:
+                break
+            remaining = right.ravel() - missing(balance, x)
+            if np.linalg.norm(remaining) <= enough:
+                break
+        else:
+            force_n = balance.contact.load_step.force_n
             raise ConvergenceError(f"The gradient of the foundation model did not settle at {force_n:g} N; {_REMEDY}")
-        return self._contact(np.split(scale * length * x.reshape(right.shape), sizes, axis=-1), change)
+        return self._contact(balance, np.split(scale * length * x.reshape(right.shape), sizes, axis=-1), change)[0]
 
     def _split(self, at):
         return at.loads, at.lateral, at.rise, at.shift
