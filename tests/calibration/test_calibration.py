@@ -4,6 +4,7 @@ All numbers are of a small sensor in the elastic model; the paper's sensor in th
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -214,6 +215,27 @@ def test_presses_end_where_the_model_ceases_to_be_valid(bench):
     problem = Problem(bench.presses, [replace(one, mesh=spike)], ())
     _, inverse = problem.stacked()
     assert (inverse[one.force_of_bins > problem.valid_n[0]] == 0).all() and problem.valid_n[0] < one.force_n.max()
+
+
+def test_a_recording_whose_forces_the_model_is_valid_at_none_of_is_refused(bench):
+    problem = Problem(bench.presses, [bench.experiment(BALL, (0, 0, 0))], ())
+    problem.valid_n[0] = 0.0
+    with pytest.raises(InputError, match="the elastic model is valid at none of its forces, up to .* N; give presses of a blunter"):
+        check_recordings(problem)
+
+
+def test_each_object_has_its_own_presses_also_where_the_one_before_is_gone(bench, monkeypatch):
+    """Objects that are dropped leave their identity to later ones."""
+    asked = []
+
+    def pressed(presses, mesh, *_):
+        asked.append(mesh.volume)
+        return SimpleNamespace(normal_force_n=np.array([1.0, 2.0]), deformation_map_mm=np.full((2, 2, 2), mesh.volume))
+
+    monkeypatch.setattr(Presses, "_press", pressed)
+    presses = Presses(bench.presses.sensor, model="elastic")
+    found = [presses.ladder(trimesh.creation.box((side, 1, 1)), (0, 0, 0), largest_n=1.0).maps_mm[0, 0, 0] for side in range(1, 60)]
+    assert found == pytest.approx(range(1, 60)) and len(asked) == 59
 
 
 def test_the_press_that_covers_what_was_not_pressed_is_advised(bench, experiments):

@@ -129,6 +129,24 @@ def test_a_table_without_a_circle_of_an_image_is_refused(folder, tmp_path):
         read_presses([folder], folder / "untouched.png", tmp_path / "circles.csv")
 
 
+def test_circles_whose_image_is_not_known_are_refused(folder, tmp_path):
+    table = tmp_path / "circles.csv"
+    table.write_text("image,centre_x_px,centre_y_px,radius_px\n" + "".join(f"press_{k}.png,50,45,16\n" for k in (0, 1, 2, 3, 4, 0)))
+    with pytest.raises(InputError, match="circles.csv: press_0.png stands twice, so it is not known whose circle one is"):
+        read_presses([folder], folder / "untouched.png", table)
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "press_0.png").write_bytes((folder / "press_0.png").read_bytes())
+    with pytest.raises(InputError, match="--circles: press_0.png stands twice"):
+        read_presses([folder / "press_0.png", folder / "press_1.png", tmp_path / "more" / "press_0.png"], folder / "untouched.png",
+                     circles(tmp_path, 2))
+
+
+def circles(folder, count):
+    path = folder / "circles_of_each.csv"
+    path.write_text("image,centre_x_px,centre_y_px,radius_px\n" + "".join(f"press_{k}.png,50,45,16\n" for k in range(count)))
+    return path
+
+
 def test_a_contact_larger_than_the_ball_is_refused_and_nothing_is_written(folder, tmp_path, capsys):
     out = tmp_path / "mine.yaml"
     status = main(["calibrate-camera", str(folder), "--ball-mm", "2", "--mm-per-px", "0.1", "--background",

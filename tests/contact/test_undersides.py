@@ -55,6 +55,16 @@ def test_an_underside_is_that_of_its_specification_in_any_pose(name, sides):
         assert found.top_mm == pytest.approx(placed.bounds[1, 2] - touch, abs=1e-9)
 
 
+def test_a_mesh_that_is_moved_afterwards_leaves_the_surface_as_it_was():
+    mesh = MESHES["ball"].copy()
+    surface, grid = ObjectSurface(mesh), grid_of(True)
+    mesh.apply_translation((2.0, 0.0, 0.0))
+    for pose in POSES:
+        found, expected = (one.over(target(grid), pose).height_mm for one in (surface, ObjectSurface(MESHES["ball"])))
+        assert (found == expected).all()
+    assert surface.mesh.bounds[0, 0] == MESHES["ball"].bounds[0, 0]
+
+
 def odd(name):
     """A mesh without its lower side, or with all facets inside out, tilted."""
     mesh = trimesh.creation.icosphere(subdivisions=2, radius=4.0)

@@ -133,6 +133,24 @@ def test_a_free_base_that_carries_the_sensor_is_no_object(coro, joint):
     assert list(sensor.read(data).objects) == ["box"]
 
 
+def test_a_model_that_lacks_a_named_object_is_refused_at_each_reading_and_then_another_is_read(coro):
+    models = {name: mujoco.MjModel.from_xml_string(scene(box().replace('"box"', f'"{name}"', 1))) for name in ("box", "cube")}
+    states = {name: settled(model, 0.05) for name, model in models.items()}
+    sensor = attach(models["box"], "plate", coro, objects=["box"])
+    first = sensor.read(states["box"]).force_n
+    for _ in range(2):
+        with pytest.raises(InputError, match="'box'"):
+            sensor.read(states["cube"])
+    assert (sensor.read(states["box"]).force_n == first).all()
+
+
+@pytest.mark.parametrize(("own", "given", "expected"), [(0.25, None, 0.25), (0.25, 0.6, 0.6), (0.0, None, 1.0), (0.25, 0.0, 0.0)])
+def test_an_added_pad_has_the_friction_that_is_given_or_the_sensor_s_own(coro, own, given, expected):
+    spec = mujoco.MjSpec.from_string(scene(box()))
+    attach(spec, "plate", coro.with_friction(own), friction=given)
+    assert spec.geom("plate_pad").friction[0] == pytest.approx(expected)
+
+
 def test_only_named_objects_count(coro):
     spec = mujoco.MjSpec.from_string(scene(box(0.5, x=0.004, y=0.01) + BALL))
     sensor = attach(spec, "plate", coro, objects=["ball"])
@@ -148,6 +166,27 @@ def test_the_force_of_a_sensor_carries_a_box_in_place_of_the_engine_s_contact(co
     assert pushed[-1]["box"] == pytest.approx([0, 0, mass * G], abs=1e-3 * mass * G)
     assert sensor.read(data).force_n == pytest.approx([0, 0, -mass * G], rel=0.02)
     assert np.abs(data.qvel).max() < 1e-2
+
+
+@pytest.mark.filterwarnings("ignore::softtact.errors.ShellWarning")
+def test_a_plate_that_met_the_shell_alone_is_pressed_when_it_lies_on_the_pad(coro):
+    """A plate tilted by 40 degrees touches the shell beside the pad; then it lies flat, 0.3 mm deep."""
+    plate = '<body name="lid" pos="0 0 .05"><freejoint/><geom type="box" size=".02 .004 .002" mass=".5"/></body>'
+    model = mujoco.MjModel.from_xml_string(scene(plate, collides=NO_CONTACT))
+
+    def placed(data, degrees, height_mm):
+        data.qpos[3:] = Rotation.from_euler("y", degrees, degrees=True).as_quat(scalar_first=True)
+        data.qpos[:3], data.qvel[:] = [0.0, 0.0, 1e-3 * height_mm], 0.0
+        mujoco.mj_forward(model, data)
+        return data
+
+    sensor, data = attach(model, "plate", coro, source="poses", friction=0.5), mujoco.MjData(model)
+    height_mm = next(float(height) for height in np.arange(11.6, 9.0, -0.1) if sensor.touching(placed(data, 40.0, height)))
+    assert not hand_back(placed(data, 40.0, height_mm), [sensor]) and sensor.held(data)
+    lying = hand_back(placed(data, 0.0, 1.7), [sensor])
+    fresh = attach(model, "plate", coro, source="poses", friction=0.5)
+    assert lying["lid"] == pytest.approx(hand_back(placed(data, 0.0, 1.7), [fresh])["lid"], rel=0.02, abs=1e-6)
+    assert lying["lid"][2] > 5.0
 
 
 @pytest.mark.parametrize(("friction", "slides"), [(0.5, False), (0.2, True)])
@@ -192,6 +231,14 @@ def test_an_object_driven_deeper_than_the_sensor_is_thick_reads_the_largest_forc
 def test_a_depth_that_the_largest_force_does_not_reach_says_so(coro):
     assert read_at(coro, box(), 8.8).validity_reason == "box: the force is above 50 N, the sensor's limit"
     assert not read_at(coro, box(), 9.5).validity_reason     # 0.5 mm: 38 N
+
+
+def test_a_depth_at_which_feet_rest_on_the_shell_says_so_and_not_the_largest_force(coro):
+    """Feet beside the pad, 1.8 mm below the ball's lowest point less 0.6 mm, meet the shell 1.5 mm below at a depth of 0.3 mm."""
+    feet = "".join(f'<geom type="box" size=".0005 .002 .003" pos="{x} 0 .0018"/>' for x in (-0.012, 0.012))
+    ball = f'<body name="tool" pos="0 0 0"><freejoint/><geom type="sphere" size=".003" pos="0 0 .003"/>{feet}</body>'
+    reading = read_at(coro, ball, -0.6)
+    assert "tool: the object rests on the shell beside the pad" in reading.validity_reason and -reading.force_n[2] < 2.0
 
 
 def test_an_object_wholly_below_the_surface_says_so_as_in_a_press_alone(coro):

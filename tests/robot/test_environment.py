@@ -92,11 +92,29 @@ def test_taxels_are_those_of_a_press_at_that_place_and_force(env):
 
 
 def test_a_force_above_the_largest_whose_map_is_the_reading_is_told():
-    weak = gymnasium.make(ID, largest_force_n=0.5)     # the fingers' motors have 1 N at least
+    weak = gymnasium.make(ID, largest_force_n=0.5)
+    weak.unwrapped.largest_force_n = 1.0     # of the fingers' motors, after the readings were made for 0.5 N
     seen, *_, info = play(weak, ((1.0, 0.0, 0.0), 40), options=STILL)
     assert info["force_above_largest_n"] == pytest.approx(-seen[-1]["force_n"][:, 2] - 0.5, rel=1e-5)
     assert info["force_above_largest_n"].min() > 0.3
     assert not play(weak, ((-0.5, 0.0, 0.0), 1))[-1]["force_above_largest_n"].any()
+
+
+@pytest.mark.parametrize(("largest_n", "grip"), [(0.3, 1.0), (30.0, -0.98)])
+def test_closed_fingers_press_with_their_share_of_the_largest_force_below_a_newton_too(largest_n, grip):
+    """0.3 N each; the pads lie on the object before its share is set, for which the open fingers' motors have 1 N."""
+    force = -play(gymnasium.make(ID, largest_force_n=largest_n), ((grip, 0.0, 0.0), 60), options=STILL)[0][-1]["force_n"][:, 2]
+    assert force == pytest.approx([0.3, 0.3], abs=0.03)
+
+
+def test_a_refused_reset_changes_no_episode_and_no_later_draw(env):
+    env.reset(seed=3)
+    drawn = env.reset()[0]["object_pose"]
+    env.reset(seed=3)
+    before = env.unwrapped._data
+    with pytest.raises(InputError, match="y_mm=-40"):
+        env.reset(options={"y_mm": -40.0})
+    assert env.unwrapped._data is before and (env.reset()[0]["object_pose"] == drawn).all()
 
 
 @pytest.mark.slow
@@ -118,6 +136,8 @@ def test_environments_run_beside_each_other_in_processes():
                                              ({"device": "cuda", "sensor": "gelsight_mini"}, "device='cuda': gels follow their ob"),
                                              ({"place_step_mm": 0.0}, "place_step_mm=0: give a length in mm above 0 and below"),
                                              ({"scene": {"frction": 1}}, "at 'frction': the key is unknown"),
+                                             ({"scene": {"time_step_s": 0.03}}, "scene: time_step_s=0.03: an action takes 0.01 s"),
+                                             ({"scene": {"time_step_s": 0.004}}, "time_step_s=0.004: .* which is no multiple"),
                                              ({"scene": ["friction"]}, r"scene=\['friction'\]: give keys and values"),
                                              ({"mass_kg": 0.0}, "mass_kg=0.0: give a finite number from 1e-06 to 100 .kg"),
                                              ({"mass_kg": -1}, "mass_kg=-1: give a finite number"),

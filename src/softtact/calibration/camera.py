@@ -110,6 +110,10 @@ def _read_circles(path, files):
     if len(places) != 1:
         raise InputError(f"{path}: it has no single column named 'image' among {', '.join(table.header)}; name one so.")
     names = [str(cells[places[0]]) for _, cells in table.rows]
+    for given, of in ((names, path), ([file.name for file in files], "--circles")):
+        if twice := [name for name in given if given.count(name) > 1]:
+            raise InputError(f"{of}: {twice[0]} stands twice, so it is not known whose circle one is; give each image a name "
+                             "of its own.")
     missing = [file.name for file in files if file.name not in names]
     if missing:
         raise InputError(f"{path}: it has no row for {missing[0]}; give the circle of each image, or leave --circles out.")

@@ -80,6 +80,10 @@ def _check(problem, k, one):
     ladder, moving = problem.at_place(k)
     bins = np.unique(np.linspace(0, len(one.counts) - 1, _BINS).astype(int))
     bins = bins[one.force_of_bins[bins] <= problem.valid_n[k]]
+    if problem.valid_n[k] <= 0 or not (one.force_of_bins[bins] > 0).any():
+        raise InputError(f"{one.name}: the {problem.presses.model} model is valid at none of its forces, up to "
+                         f"{one.force_n.max():g} N; give presses of a blunter object or with smaller forces, or another "
+                         "--model.")
     usable = one.usable[bins].astype(float)
     predicted = _predicted(problem, one, ladder, moving, bins, 1.0)
     here = _unexplained(predicted, one.counts[bins], usable)

@@ -48,7 +48,7 @@ class Presses:
     sensor: Sensor
     model: str = "foundation"
     levels: int = LEVELS
-    known: dict[Any, Ladder] = field(default_factory=dict)
+    known: dict[Any, tuple[trimesh.Trimesh, Ladder]] = field(default_factory=dict)     # a mesh that is gone leaves its id to others
     variants: dict[float, Sensor] = field(default_factory=dict)
 
     def ladder(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float, cover: float = 1.0) -> Ladder:
@@ -56,11 +56,11 @@ class Presses:
 
         cover: factor of the sensor's cover thickness. Forces that the model does not reach are left out.
         """
-        key = (id(mesh), *np.round(place, 6), round(largest_n, 6), cover)
+        key = (id(mesh), hash(mesh), *np.round(place, 6), round(largest_n, 6), cover)
         if key not in self.known:
             result = self._press(mesh, place, even_in_root(largest_n, self.levels), cover, None)
-            self.known[key] = Ladder(result.normal_force_n, result.deformation_map_mm)
-        return self.known[key]
+            self.known[key] = mesh, Ladder(result.normal_force_n, result.deformation_map_mm)
+        return self.known[key][1]
 
     def reach(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float) -> tuple[float, float]:
         """The largest of some coarse load steps (N) for which the model is valid for an object at a place, and the next load step.

@@ -36,8 +36,9 @@ class ObjectSurface:
         if not isinstance(mesh, trimesh.Trimesh):
             raise InputError(f"ObjectSurface: {mesh!r} is no mesh; read one with softtact.read_mesh(path, unit='mm').")
         check_given(mesh)
-        self.mesh = mesh
-        self._points, self._facets = np.array(mesh.vertices, dtype=float), np.ascontiguousarray(mesh.faces, dtype=np.int64)
+        self.mesh = mesh.copy()      # a later change of the caller's is not this surface's
+        self._points = np.array(self.mesh.vertices, dtype=float)
+        self._facets = np.ascontiguousarray(self.mesh.faces, dtype=np.int64)
 
     @cached_property
     def centred(self) -> Pose:

@@ -86,7 +86,7 @@ def attach(model: Any, body: str, sensor: Sensor | str, *, pose: Pose | Sequence
     press: elastic or foundation, the model that presses;  objects: names of the bodies that count; by default all that touch,
     from poses all with a free joint
     friction: Coulomb's coefficient of objects on the sensor: of an added geom, gels and forces that go back; by default the
-    sensor's own
+    sensor's own; an added geom of a sensor without friction has the engine's 1
     Raises InputError for a body that the scene lacks, a frame that points into the body, an object that cannot be pressed.
     """
     if not isinstance(model, mujoco.MjModel | mujoco.MjSpec):
@@ -251,15 +251,18 @@ class AttachedSensor:
         return self._memories[data]
 
     def _find(self, model):
-        self._meshes.clear()
-        self._model, self._body = model, _body_of(model, self.body)
+        """Set all that depends on the model; where something is missing, the next call looks again."""
+        self._model = None
+        self._body = _body_of(model, self.body)
         self._geoms = {int(geom) for geom in geoms_of(model, self._body)}
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
         carrier = rigid_body_of(model, self._body)
         self._named = [int(body) for body in free if body != carrier and self.source == "poses" and _has_geoms(model, body)]
         if self.objects is not None:
             self._named = [_body_of(model, name) for name in self.objects]
-        self._reach = {body: np.linalg.norm(self._mesh(body).vertices, axis=1).max() for body in self._named}
+        self._meshes = {body: body_mesh(model, body) for body in self._named}
+        self._reach = {body: np.linalg.norm(mesh.vertices, axis=1).max() for body, mesh in self._meshes.items()}
+        self._model = model
 
     def _mesh(self, body):
         if body not in self._meshes:
@@ -294,8 +297,10 @@ class AttachedSensor:
         result = self._judged(self.press_depth(data, body, depth_mm, guess).result,
                               self._placed(data, body).bounds[1, 2] + depth_mm)
         last[body] = np.zeros(0), result
-        wanted = min(depth_mm, self.sensor.spec.thickness_mm)
-        return result, "" if result.indentation_mm[0] >= _REACHED * wanted else self._over
+        wanted, most = min(depth_mm, self.sensor.spec.thickness_mm), self.sensor.spec.force_range_n[1]
+        if result.indentation_mm[0] >= _REACHED * wanted:
+            return result, ""
+        return result, self._over if result.normal_force_n[0] >= _REACHED * most else "the object rests on the shell beside the pad"
 
     def _judged(self, result, height_mm):
         """A result with its expected error, and flagged where an object of this height is wholly below the surface."""
@@ -431,6 +436,7 @@ def _add_pad(spec, body, frame, attached, friction):
     middle = frame.apply(np.array([[0.0, 0.0, -0.5 * sensor.thickness_mm]]))[0] * MM
     pad = here.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=half, pos=middle, quat=quat, mass=0.0, rgba=PAD_COLOUR,
                         contype=collides, conaffinity=collides, priority=1, **PAD_CONTACT)
-    if friction is not None:
-        pad.friction = (friction, friction * TORSION_M, 0.0)
+    own = sensor.friction.object
+    if friction is not None or own > 0:
+        pad.friction = (own, own * TORSION_M, 0.0)
     here.add_site(name=name, pos=frame.translation_mm * MM, quat=quat, size=(1e-3, 1e-3, 1e-3))

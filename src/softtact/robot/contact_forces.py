@@ -49,6 +49,8 @@ class _Contact:
     @classmethod
     def of(cls, sensor: AttachedSensor, data: Any, body: int, depth_mm: float, before: "_Contact | None") -> "_Contact":
         """That of an object pressed anew; a contact before keeps its shear."""
+        if before and not len(before.press.points_mm):      # on the shell alone: nothing of it is known
+            before = None
         guess = (before.force_n * (depth_mm / before.reached_mm)**_POWER if before else
                  0.1 * sensor.sensor.spec.force_range_n[1] * depth_mm / sensor.sensor.spec.thickness_mm)
         press, pose = sensor.press_depth(data, body, depth_mm, guess), sensor.object_pose(data, body)
@@ -101,6 +103,8 @@ class _Contact:
 
     def has_moved(self, here: tuple[np.ndarray, Rotation]) -> bool:
         """Whether the depth under pressure, or the place of that, has changed so much that the object is pressed anew."""
+        if not len(self.press.points_mm):      # on the shell alone: where it touches the pad is not known
+            return True
         ways = self._ways(here)
         sunk, aside = np.abs(ways[:, 2]).max(initial=0.0), np.linalg.norm(ways[:, :2], axis=1).max(initial=0.0)
         return bool(sunk > max(_RENEWED * self.reached_mm, _RENEWED_MM) or aside > _ASIDE_MM)

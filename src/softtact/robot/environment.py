@@ -9,12 +9,13 @@ Importing this module registers the environment.
 import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import mujoco
 import numpy as np
 import trimesh
+from gymnasium.utils import seeding
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
@@ -35,8 +36,19 @@ LIFT_MM, SLIDE_MM = 40.0, 8.0     # largest lift, and largest slide to either si
 _LIFT_MM_S, _SLIDE_MM_S, _FINGER_MM_S = 50.0, 20.0, 20.0
 _BEGIN_MM = 2.0               # between object and each pad at first
 _LETS_GO_MM, _DROPPED_MM = 0.5, 20.0
-_CLOSED_M = -0.1
+_CLOSED_M, _MOVES_N = -0.1, 1.0      # aim of closed fingers; force that moves open ones
 _SPREAD = {"x_mm": 2.0, "y_mm": 4.0, "angle_deg": 45.0}     # of the object's drawn placement, to either side
+
+
+class Beginning(NamedTuple):
+    """How an episode begins."""
+
+    scene: Scene
+    """The hand around the object."""
+    random: np.random.Generator
+    """What later episodes are drawn from."""
+    seed: int
+    """Of that."""
 
 
 class GraspEnv(gymnasium.Env):
@@ -71,6 +83,7 @@ class GraspEnv(gymnasium.Env):
             raise InputError(f"render_mode={render_mode!r}: the environment draws images only; use 'rgb_array', or leave it out.")
         self.render_mode, self._painter = render_mode, Painter()
         self._sensor, self._settings = load_sensor(sensor), load_scene(**_keys(scene))
+        self._scene_steps = _steps_of(self._settings.time_step_s)
         self._mass_kg = None if mass_kg is None else mass_of(mass_kg)
         self._mesh = _mesh_of(mesh, unit)
         self.largest_force_n = number("largest_force_n", largest_force_n, unit="N")
@@ -106,15 +119,20 @@ class GraspEnv(gymnasium.Env):
 
         options: x_mm, y_mm, angle_deg, in place of random values
         """
-        self.begin(seed=seed, options=options)
+        self.begin(self.draw(seed=seed, options=options))
         return self._observe(), self._info()
 
-    def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+    def draw(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> "Beginning":
+        """The scene of an episode to come, as of `reset`; nothing has changed where it is refused."""
+        random, number = (copy.deepcopy(self.np_random), self.np_random_seed) if seed is None else seeding.np_random(seed)
+        drawn = {name: float(random.uniform(-side, side)) for name, side in _SPREAD.items()}
+        scene = build_scene(self._mesh, self._sensor.spec, self._settings, self._placement(drawn, options or {}),
+                            mass_kg=self._mass_kg)
+        return Beginning(scene, random, number)
+
+    def begin(self, drawn: "Beginning") -> None:
         """The beginning of an episode, as of `reset`, without an observation."""
-        super().reset(seed=seed)
-        drawn = {name: float(self.np_random.uniform(-side, side)) for name, side in _SPREAD.items()}
-        self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, self._placement(drawn, options or {}),
-                                  mass_kg=self._mass_kg)
+        self._scene, self._np_random, self._np_random_seed = drawn.scene, drawn.random, drawn.seed
         self._place_hand()
         self.readings.begin()
 
@@ -143,7 +161,7 @@ class GraspEnv(gymnasium.Env):
         self._move_hand(lift, slide)
         self._move_fingers(0.5 * (grip + 1.0))
         before = self._risen_mm()
-        mujoco.mj_step(self._scene.model, self._data, nstep=round(STEP_S / self._settings.time_step_s))
+        mujoco.mj_step(self._scene.model, self._data, nstep=self._scene_steps)
         mujoco.mj_forward(self._scene.model, self._data)
         risen = self._risen_mm()
         ended = risen < -_DROPPED_MM or risen > 0.98 * LIFT_MM
@@ -200,13 +218,14 @@ class GraspEnv(gymnasium.Env):
 
     def _move_fingers(self, share):
         """Close with a share of the largest force, or open where it is zero."""
-        force = share * self.largest_force_n
-        self._scene.model.actuator_forcerange[self._fingers] = (-max(force, 1.0), max(force, 1.0))
+        force, touch = share * self.largest_force_n, contacts(self._scene.model, self._data).all()
         if share == 0.0:
             self._half_mm = min(self._half_mm + _FINGER_MM_S * STEP_S, self._open_mm)
-        elif not contacts(self._scene.model, self._data).all():
+        elif not touch:
             self._half_mm = max(self._half_mm - _FINGER_MM_S * STEP_S, 0.0)
-        closed = share > 0.0 and contacts(self._scene.model, self._data).all()
+        closed = share > 0.0 and touch
+        most = force if closed else max(force, _MOVES_N)
+        self._scene.model.actuator_forcerange[self._fingers] = (-most, most)
         self._data.ctrl[self._fingers] = _CLOSED_M if closed else self._half_mm * MM
 
     def _risen_mm(self):
@@ -253,6 +272,15 @@ def _keys(scene):
     if not isinstance(scene, Mapping | None) or any(not isinstance(name, str) for name in scene or {}):
         raise InputError(f"scene={scene!r}: give keys and values of a scene file, such as {{'friction': 0.4}}.")
     return scene or {}
+
+
+def _steps_of(time_step_s):
+    """The engine's steps in one of the environment; refuses a time step of which it is no multiple."""
+    steps = round(STEP_S / time_step_s)
+    if steps < 1 or abs(steps * time_step_s - STEP_S) > 1e-6 * STEP_S:
+        raise InputError(f"scene: time_step_s={time_step_s:g}: an action takes {STEP_S:g} s, which is no multiple of it; give "
+                         "0.001, 0.002 or another whole fraction.")
+    return steps
 
 
 def _space_of(values):

@@ -101,6 +101,9 @@ class Painter:
             content = process.stdout.read(int(np.prod(shape)))
         except BrokenPipeError:
             content = b""
+        except BaseException:      # an interrupt: the image that nobody reads would be taken for the next one
+            self.close()
+            raise
         if len(content) < np.prod(shape):
             reason = process.communicate()[1].decode(errors="replace").strip().splitlines() or ["without a message"]
             self.close()

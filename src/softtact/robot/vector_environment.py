@@ -68,8 +68,9 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
             raise InputError(f"reset: the option reset_mask leaves out hand {new[0]}, which has no episode yet; reset all hands "
                              "first.")
         seeds = _seeds(seed, self.num_envs)
-        for hand in np.flatnonzero(mask):
-            self._hands[hand].begin(seed=seeds[hand], options=given)
+        drawn = {hand: self._hands[hand].draw(seed=seeds[hand], options=given) for hand in np.flatnonzero(mask)}
+        for hand, beginning in drawn.items():     # none where one is refused
+            self._hands[hand].begin(beginning)
         self._steps[mask], self._over[mask] = 0, False
         return self._observe(mask)
 
@@ -85,7 +86,7 @@ class GraspVectorEnv(gymnasium.vector.VectorEnv):
         rewards, ended = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         for number, (hand, action) in enumerate(zip(self._hands, checked, strict=True)):
             if self._over[number]:
-                hand.begin()
+                hand.begin(hand.draw())
             else:
                 rewards[number], ended[number] = hand.advance(action)
         self._steps = np.where(self._over, 0, self._steps + 1)

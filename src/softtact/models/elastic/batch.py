@@ -34,6 +34,7 @@ _GROUP, _GROUPS = 32, 8     # least columns of one rectangle, and most rectangle
 _SIDES = 5              # lengths of a rectangle's sides, so that few are prepared
 _NEAR = 1.8             # times the depth on springs, which are stiffer at a contact's edges than the layer
 _SUMMED = 128          # products that are summed up in single precision
+_HELD = 1e-3            # by which an object held at the shell may press more than its force: what settling leaves
 _ROUNDING = 1e-6       # of a force: what single precision leaves of it
 _TINY = 1e-30           # in place of a zero that divides
 
@@ -241,10 +242,12 @@ def _among(compliance, quarter, heights, forces_n, stops, first, device, setting
     resting = (_on_host(press.depth) > stops) | (~_on_host(press.settled) & np.isfinite(stops))
     if resting.any():
         press.hold(surface.put(np.flatnonzero(resting)), surface.put(stops[resting]))
+    settled = _on_host(press.settled)
+    settled &= ~resting | (_on_host(xp.sum(press.force, axis=0)) <= forces_n * (1 + _HELD))      # the shell carries the rest
     force, depth = xp.astype(press.force, xp.float32), _on_host(press.depth)
     fields = surface.fields(force)
     return {"force": surface.at_nodes(press.force), "depth": depth, "gap": heights - depth[:, None] + fields, "fields": fields,
-            "iterations": _on_host(press.iterations), "settled": _on_host(press.settled)}
+            "iterations": _on_host(press.iterations), "settled": settled}
 
 
 class _Columns:
