@@ -1,9 +1,9 @@
 """What a choice of model costs, and what error it accepts, held against the fine mesh: `python benchmarks/choice.py`, a minute.
 
 The hyperelastic maps and times are those that `objects.py --mesh fine` left, of indenters and of the paper's objects; the fast
-models are pressed here. The error to expect is calibrated on the indenters and tested on the objects; the constants
-of `softtact.press.choice.FoundationError` are not of this run but of `expected_error.py`. Prints the tables of docs/explanation/fast_models.md, draws
-docs/policies.png, writes benchmarks/results/choice.json.
+models are pressed here. The error to expect is calibrated on the indenters and tested on the objects; the constants of
+`softtact.press.choice.FoundationError` are not of this run but of `expected_error.py`. Prints the tables of
+docs/explanation/fast_models.md, draws docs/policies.png, writes benchmarks/results/choice.json.
 """
 
 import json

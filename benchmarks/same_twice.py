@@ -1,6 +1,6 @@
 """Are the tables and maps of two runs of a study the same, byte for byte?
 
-    python benchmarks/same_twice.py                      # runs the tiny study with 1 and with 2 cores (some ten minutes each), compares
+    python benchmarks/same_twice.py                      # runs the tiny study with 1 and with 2 cores (ten minutes each), compares
     python benchmarks/same_twice.py --compare A B        # compares two result folders that are there already
 
 Left out are what tells of the run and not of the study: times (of the presses' attributes; files of times and what holds them),
