@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softtact.cli import _parser, main
+from softtact.commands.common import show
 from softtact.errors import InputError
 from softtact.files import parse_json, read_yaml
 from softtact.outputs import refuse_overwriting
@@ -116,6 +119,42 @@ def test_an_output_that_is_an_input_is_refused_by_whatever_path(folder, capsys, 
     status, out, said = said_by(capsys, line.format(here=folder.name))
     assert (status, out) == (1, "") and sentence in said
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(("line", "sentence"), [
+    ("cost --cores 0", "--cores 0: give 1 or more"), ("grasps tiny.yaml --workers -2 --cost", "--workers -2: give 1 or more"),
+    ("dataset part.stl --unit mm --presses 1 --out d.nc --workers 0", "--workers 0: give 1 or more"),
+    ("fit uniaxial=plain.csv --out card.json --skip-rows -1", "--skip-rows -1: give the number of lines above the header, 0 or"),
+    ("export-deck part.stl --unit mm --force 5 --format calculix --out d.inp --sensor tiny_skin.yaml",
+     "is a sensor of kind skin, of which there is no deck; name one of layers, or of kind solid")])
+def test_numbers_and_sensors_that_make_no_sense_are_refused(folder, capsys, line, sentence):
+    (folder / "tiny.yaml").write_bytes((ROOT / "config/tiny_grasps.yaml").read_bytes())
+    (folder / "tiny_skin.yaml").write_bytes((ROOT / "config/tiny_skin.yaml").read_bytes())
+    status, out, said = said_by(capsys, line)
+    assert (status, out) == (1, "") and sentence in said
+
+
+def test_json_holds_null_for_what_is_not_finite(capsys):
+    show({"a": [1.0, float("nan")], "b": (float("inf"), np.float64("nan"))}, as_json=True, lines=[])
+    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail) == {"a": [1.0, None], "b": [None, None]}
+
+
+def test_a_catalogue_that_is_no_list_is_refused(tmp_path):
+    (tmp_path / "objects.yaml").write_text("5\n")
+    with pytest.raises(InputError, match="objects.yaml: it holds 5; write a list of objects"):
+        read_catalogue(tmp_path / "objects.yaml")
+
+
+def test_a_command_mends_turned_facets_where_trimesh_came_without_all_its_packages(tmp_path):
+    """In a process of its own, as packages that are there already are not hidden."""
+    box = trimesh.creation.box((4, 4, 2))
+    box.faces[3] = box.faces[3][::-1]
+    box.export(tmp_path / "turned.stl")
+    code = ("from softtact.commands.common import import_trimesh; import_trimesh(); "
+            "from softtact.geometry.repair import read_mended; import sys; "
+            "found = read_mended(sys.argv[1], unit='mm'); print(found.repairs, found.mesh.volume)")
+    ended = subprocess.run([sys.executable, "-c", code, str(tmp_path / "turned.stl")], capture_output=True, text=True, check=False)
+    assert ended.returncode == 0 and "turned 1 facet that faced against the neighbours" in ended.stdout, ended.stderr
 
 
 def test_a_card_that_the_chosen_model_does_not_use_is_told(folder, capsys):

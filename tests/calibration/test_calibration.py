@@ -16,7 +16,7 @@ from support.sound_recordings import ramp
 import softtact
 from softtact.calibration.checks import Candidate, check_recordings, check_result, rank
 from softtact.calibration.experiment import experiment
-from softtact.calibration.fit import CalibrationResult, calibrate, write_calibrated
+from softtact.calibration.fit import CalibrationResult, _keep_files, calibrate, write_calibrated
 from softtact.calibration.ladder import Presses, with_cover
 from softtact.calibration.problem import Problem
 from softtact.errors import InputError
@@ -163,6 +163,46 @@ def test_a_modulus_that_runs_to_the_end_of_its_range_is_not_believed(bench, expe
     with pytest.raises(InputError, match="fitted moduli are 2.00 times those of the materials, a bound of the fit; check"):
         check_result(at_end)
     check_result(replace(at_end, vector=problem.mean))
+
+
+@pytest.mark.parametrize(("name", "end", "sentence"), [
+    ("cover", 1.25, "fitted cover is 1.25 times as thick as the file states, a bound of the fit"),
+    ("friction", 0.6, "fitted friction is 0.60, a bound of the fit"),
+    ("angle 1", 15.0, "press 0.csv: the object would be turned by 15 degrees, a bound of the fit; state how it lay")])
+def test_a_number_at_the_end_of_its_range_is_not_believed(bench, experiments, name, end, sentence):
+    problem = SimpleNamespace(names=[name], bounds=(np.array([-end]), np.array([end])), experiments=experiments[:1])
+    gains = SimpleNamespace(gain=np.ones((7, 4)), scale=1.0)
+    with pytest.raises(InputError, match=sentence):
+        check_result(SimpleNamespace(problem=problem, vector=np.array([end]), linear=gains, modulus_scale=1.0))
+
+
+def test_readings_beyond_the_models_validity_are_left_out_at_the_fitted_moduli(bench):
+    """A sensor of .7 of the moduli is as deep at .7 of the force, so the largest recorded force that counts is as much less."""
+    one = replace(bench.experiment(BALL, (0, 0, 0)), mesh=trimesh.creation.icosphere(subdivisions=3, radius=1.0))
+    problem = Problem(bench.presses, [one], ("modulus",))
+    for scale in (1.0, 0.7):
+        problem.at(np.array([np.log(scale)]))
+        _, inverse = problem.stacked()
+        used = one.force_of_bins[(inverse > 0).any(axis=(1, 2))].max()
+        assert used <= scale * problem.valid_n[0] and problem.used_up_to_n == [pytest.approx(scale * problem.valid_n[0])]
+        assert one.force_of_bins.max() > scale * problem.valid_n[0]
+
+
+def test_a_sensor_that_states_its_creep_is_refused_before_a_fit_of_it(bench, experiments):
+    own = bench.presses.sensor.spec
+    spec = type(own).from_dict(own.model_dump(exclude_none=True) | {"relaxation": {"g": [0.1], "tau_s": [1.0]}})
+    presses = Presses(replace(bench.presses.sensor, spec=spec), model="elastic")
+    with pytest.raises(InputError, match="states the creep of its layers .'relaxation'., and a calibration would hold it, too"):
+        Problem(presses, experiments[:1], ("relaxation",))
+
+
+def test_files_of_readouts_are_found_from_the_folder_of_the_written_sensor(tmp_path):
+    for name in ("before", "now"):
+        (tmp_path / name).mkdir()
+    readouts = {"image": {"kind": "camera", "shading": "mine.yaml", "background": "clean.png"}}
+    (tmp_path / "before" / "mine.yaml").write_text("{}")
+    _keep_files(readouts, tmp_path / "before", tmp_path / "now")
+    assert readouts["image"] == {"kind": "camera", "shading": "../before/mine.yaml", "background": "clean.png"}
 
 
 def test_a_held_weight_acts_while_the_counts_are_high():

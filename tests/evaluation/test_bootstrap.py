@@ -27,6 +27,14 @@ def test_the_interval_of_a_normal_sample_is_students():
         assert np.mean(found) == pytest.approx(values.mean(), abs=tolerance * width(students)), count
 
 
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
+def test_the_interval_of_a_few_items_is_students_too(count):
+    """Their means of 2,000 draws end before the percentile that would be taken: two items have three means."""
+    values = 0.7 + 0.1 * stats.norm.ppf((np.arange(count) + 0.5) / count)
+    students = stats.t.interval(0.95, count - 1, values.mean(), stats.sem(values))
+    assert width(interval(values, np.arange(count))) == pytest.approx(width(students), rel=0.05)     # thrice what 2,000 draws leave
+
+
 def test_maps_of_one_object_are_not_independent():
     """Ten objects with 20 equal maps each say no more than ten maps."""
     means = np.random.default_rng(0).normal(size=10)
@@ -39,8 +47,9 @@ def test_a_trial_brings_all_its_maps():
     effect = np.array([-1.0, 1.0, -1.0, 1.0])
     items, trials = np.repeat([0, 1], 40), np.tile(np.repeat(np.arange(4), 10), 2)
     found = interval(np.tile(np.repeat(effect, 10), 2), items, trials, repeats=10_000)
-    # The mean of eight fair signs; two objects are so few that the interval is its whole range.
-    assert found == (-1.0, 1.0)
+    # The mean of eight fair signs has the variance 1 / 8, and Student's interval of two objects is wide.
+    half = np.sqrt(2) * stats.t.ppf(0.975, 1) / np.sqrt(8)
+    assert found == pytest.approx((-half, half), rel=0.02, abs=0.1)
 
 
 def test_one_item_gives_no_interval():
@@ -50,7 +59,7 @@ def test_one_item_gives_no_interval():
 def test_the_same_seed_gives_the_same_interval_and_equal_scores_a_point():
     values, items = np.random.default_rng(0).random(30), np.repeat(np.arange(6), 5)
     assert interval(values, items) == interval(values, items) != interval(values, items, seed=2)
-    assert interval(np.ones(30), items) == (1.0, 1.0)
+    assert interval(np.ones(30), items) == interval(np.ones(3), np.arange(3)) == (1.0, 1.0)
 
 
 def test_objects_may_have_trials_of_different_number_and_name():

@@ -58,6 +58,12 @@ def test_forces_that_are_all_different_are_gathered_in_ranges():
     assert (labels.value_counts() == 10).all() and force_labels(pd.Series([5.0, 12.5])).tolist() == ["5", "12.5"]
 
 
+def test_grasps_that_reach_less_than_other_sets_are_compared_at_their_own_largest_force():
+    frame = table(0.6)
+    frame = frame[(frame["set"] != "grasps") | (frame.force != "50")]
+    assert verdicts(frame, architecture="printed")[-1].startswith("At 5 N on grasped objects the printed network")
+
+
 @pytest.mark.parametrize(("network", "begins"), [(0.4, "Not trained: the printed network of the elastic model"),
                                                  (0.6, "At 50 N on grasped objects the printed network")])
 def test_a_network_below_the_mean_reading_is_called_not_trained_first(network, begins):

@@ -98,7 +98,13 @@ def test_the_cost_is_told_before_the_work(tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "said"), [({"objects": ["cion"]}, "'cion'"), ({"model": "best"}, "at 'model'"),
-                                               ({"force": 3}, "'force'"), ({"positions": 0}, "at 'positions'")])
+                                               ({"force": 3}, "'force'"), ({"positions": 0}, "at 'positions'"),
+                                               ({"scene": {"frction": 1}}, "at 'scene': .*'frction': the key is unknown"),
+                                               ({"scene": {"friction": -1}}, "at 'scene': .*friction"),
+                                               ({"force_n": 1e6}, "at 'force_n': 1e.06 N is out of the range of "),
+                                               ({"objects": ["object_1", "object_1"]}, "at 'objects': it names 'object_1' twice"),
+                                               ({"one_event": {"objects": ["cion"], "models": ["elastic"], "force_n": 5,
+                                                               "cover_law": "ogden2"}}, "at 'one_event.objects': .*'cion'")])
 def test_a_fault_of_the_configuration_is_named(tmp_path, changes, said):
     with pytest.raises(InputError, match=said):
         load_grasp_study(config(tmp_path, **changes))

@@ -334,6 +334,12 @@ def test_an_object_in_both_halves_is_refused(study_file):
         load_study(values, study_file)
 
 
+def test_an_object_named_twice_is_refused(study_file):
+    values = read_values(study_file) | {"objects": {"train": ["cone", "cone"], "test": ["torus"]}}
+    with pytest.raises(InputError, match="names 'cone' twice"):
+        load_study(values, study_file)
+
+
 def test_a_sensor_without_a_camera_is_refused(study_file):
     values = read_values(study_file) | {"sensor": "coro"}
     with pytest.raises(InputError, match="coro has no readout 'camera'; name a sensor with the readouts camera, markers and depth"):

@@ -53,6 +53,19 @@ def test_every_input_of_a_job_is_made_by_an_earlier_one():
     assert "results/real/report.html" in made
 
 
+def test_measured_files_are_inputs_so_that_a_change_of_them_gathers_them_anew(tmp_path):
+    for name in ("gel/fots/presses.csv", "gel/fots/background.npy", "gel/fots/presses/1.png", "markers.csv"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("x")
+    values = yaml.safe_load(open("config/real.yaml", encoding="utf-8"))
+    values |= {"data": str(tmp_path), "markers": values["markers"] | {"image": str(tmp_path / "markers.csv")}}
+    made = jobs(load_study(values), tmp_path / "out")
+    read = {one.label: one.inputs["files"] for one in made if one.stage in ("gather_presses", "gather_markers")}
+    assert read["gather_markers image"] == [str(tmp_path / "markers.csv")]
+    fots = next(files for name, files in read.items() if name.startswith("gather_presses") and files)
+    assert {str(tmp_path / "gel/fots" / name) for name in ("presses.csv", "background.npy", "presses/1.png")} == set(fots)
+
+
 def test_a_point_deeper_than_the_path_is_refused():
     values = yaml.safe_load(open("config/real.yaml", encoding="utf-8"))["gel_force"]
     with pytest.raises(InputError, match="depths_mm ends at 2 mm, before the point at 3 mm; add it"):

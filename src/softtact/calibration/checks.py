@@ -57,7 +57,7 @@ def check_recordings(problem: Problem) -> list[PressCheck]:
 
 
 def check_result(result: CalibrationResult) -> None:
-    """Raises InputError if a fitted number is at a bound of its range, or a taxel does not follow the presses."""
+    """Raises InputError if moduli, cover, friction or a place are at a bound of the fit, or a taxel does not follow the presses."""
     problem = result.problem
     gain = result.linear.gain / result.linear.scale
     if gain.min() <= 0:
@@ -70,6 +70,14 @@ def check_result(result: CalibrationResult) -> None:
         if name == "ln modulus" and min(value - least, most - value) < _AT_BOUND:
             raise InputError(f"The fitted moduli are {result.modulus_scale:.2f} times those of the materials, a bound of the "
                              "fit; check that the forces are in newtons, and that the objects are those that were pressed.")
+        if name == "cover" and min(value - least, most - value) < _AT_BOUND:
+            raise InputError(f"The fitted cover is {value:.2f} times as thick as the file states, a bound of the fit; correct the "
+                             "file's thickness, or leave 'cover' out of --fit.")
+        if name == "friction" and most - value < _AT_BOUND:
+            raise InputError(f"The fitted friction is {value:.2f}, a bound of the fit; leave 'friction' out of --fit and state it.")
+        if name.startswith("angle ") and min(value - least, most - value) < _AT_BOUND:
+            raise InputError(f"{problem.experiments[int(name.split()[1]) - 1].name}: the object would be turned by {value:.0f} "
+                             "degrees, a bound of the fit; state how it lay (--place).")
         if name.startswith(("x ", "y ")) and min(value - least, most - value) < _AT_BOUND:
             number = int(name.split()[1])
             raise InputError(f"{problem.experiments[number - 1].name}: the object would lie {value:.1f} mm along {name[0]}, a "

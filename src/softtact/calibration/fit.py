@@ -4,6 +4,7 @@ The file is a copy of the sensor's file with a block `calibration`, which `load_
 model would take too long, so that model is only compared with the calibrated sensor.
 """
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from softtact.errors import ConvergenceError
 from softtact.files import atomic_path
 from softtact.progress import announce
 from softtact.readout.taxels import relative_change
-from softtact.sensors.base import read_mapping
+from softtact.sensors.base import FILES_OF_READOUTS, read_mapping
 from softtact.sensors.fields import CalibrationBlock, SidesBelow
 from softtact.sensors.specification import spec_from_dict
 
@@ -236,10 +237,19 @@ def write_calibrated(path: str | Path, sensor_file: str | Path, result: Calibrat
         found = round(result.problem.value(result.vector, "friction", 0.0), 4)
         values["friction"] = values.get("friction", {}) | {"object": {"value": found, "reason": f"calibrated from {block.source}"}}
     values["calibration"] = block.model_dump(mode="json")
+    _keep_files(values.get("readouts", {}), Path(sensor_file).parent, Path(path).parent)
     spec_from_dict(values, where=str(path))
     text = yaml.safe_dump(values, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
     with atomic_path(path) as temporary:
         temporary.write_text(_HEAD.format(source=block.source) + text, encoding="utf-8")
+
+
+def _keep_files(readouts, before, now):
+    """Name files of readouts, which stand beside the sensor's file, from another folder."""
+    for entry in readouts.values():
+        for key in FILES_OF_READOUTS:
+            if isinstance(entry.get(key), str) and (before / entry[key]).is_file():
+                entry[key] = os.path.relpath(before / entry[key], now)
 
 
 def _calibrated(value_mm, source):

@@ -88,6 +88,7 @@ class Problem:
     mean: np.ndarray = field(init=False)
     deviation: np.ndarray = field(init=False)
     valid_n: list[float] = field(init=False)
+    used_up_to_n: list[float] = field(init=False)
 
     def __post_init__(self) -> None:
         self._check_fitted()
@@ -97,8 +98,6 @@ class Problem:
         softest = SOFTEST if "modulus" in self.fitted else 1.0
         reach = [self.presses.reach(one.mesh, one.place, largest_n=one.force_n.max() / softest) for one in self.experiments]
         self.valid_n, self._top = [valid for valid, _ in reach], [top for _, top in reach]
-        self._usable = [one.usable & (one.force_of_bins <= valid)[:, None, None]
-                        for one, valid in zip(self.experiments, self.valid_n, strict=True)]
         self._known: list[dict] = [{} for _ in self.experiments]
         # At the stated places, since the effect of friction hardly depends on a millimetre.
         self._friction = [friction_ladders(self.presses.sensor, one.mesh, one.place, largest_n=top, name=one.name)
@@ -110,6 +109,9 @@ class Problem:
         if unknown:
             raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
         reasons = {"cover": "knows no cover, so its thickness", "friction": "errs by more than friction changes, so that"}
+        if "relaxation" in self.fitted and self.presses.sensor.spec.relaxation is not None:
+            raise InputError(f"The file of {self.presses.sensor.spec.name} states the creep of its layers ('relaxation'), and a "
+                             "calibration would hold it, too; leave it out of the file, or 'relaxation' out of --fit.")
         for name, reason in reasons.items():
             if name in self.fitted and self.presses.model == "elastic":
                 raise InputError(f"The elastic model is one layer and {reason} cannot be fitted; leave {name!r} out of --fit, or "
@@ -161,7 +163,14 @@ class Problem:
                 [float(np.exp(self.value(vector, f"ln time {k}", 0.0))) for k in terms])
 
     def at(self, vector: np.ndarray) -> None:
-        """Compute the presses of all objects at their places in `vector`."""
+        """Compute the presses of all objects at their places in `vector`, and which readings are within the model's validity there.
+
+        A sensor of other moduli is as deep at another force, so with them the forces change up to which the model holds.
+        """
+        scale = float(np.exp(self.value(vector, "ln modulus", 0.0)))
+        self.used_up_to_n = [scale * valid for valid in self.valid_n]
+        self._usable = [one.usable & (one.force_of_bins <= most)[:, None, None]
+                        for one, most in zip(self.experiments, self.used_up_to_n, strict=True)]
         covers = COVERS if "cover" in self.fitted else (1.0,)
         self._places = [self.place(vector, k) for k in range(len(self.experiments))]
         self._ladders: list[dict[float, tuple[Ladder, np.ndarray | None]]] = []
@@ -241,7 +250,7 @@ class Problem:
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:
         """Counts (n, row, column) of all experiments, and the inverse of their standard deviations, which is 0 for dead and
-        clipped taxels and at forces above the model's validity (`valid_n`).
+        clipped taxels and at forces above the model's validity (`used_up_to_n`).
         """
         counts = np.concatenate([one.counts for one in self.experiments])
         inverse = np.concatenate([usable / one.deviation_counts

@@ -1,6 +1,7 @@
 """`softtact calibrate`: a calibrated sensor from recordings of known presses."""
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -139,8 +140,10 @@ def _is_number(text):
 def _place(text):
     try:
         x, y, angle = map(float, text.split(","))
+        if not all(map(math.isfinite, (x, y, angle))):
+            raise ValueError(text)
     except ValueError:
-        raise InputError(f"--place {text}: it is not three numbers; write x,y,angle in mm and degrees.") from None
+        raise InputError(f"--place {text}: it is not three finite numbers; write x,y,angle in mm and degrees.") from None
     return x, y, angle
 
 
@@ -171,7 +174,7 @@ def _experiment(path, mesh, force, place, options, spec):
 
 def _notes(problem, checks):
     """Sentences on readings that are left out, and on an orientation that the recordings do not show."""
-    for one, valid in zip(problem.experiments, problem.valid_n, strict=True):
+    for one, valid in zip(problem.experiments, problem.used_up_to_n, strict=True):
         if one.force_of_bins.max() > valid:
             yield (f"{one.name}: readings above {valid:.3g} N are left out, for which the {problem.presses.model} model is not "
                    "valid.")

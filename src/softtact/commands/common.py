@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -86,8 +87,22 @@ def report_reading(options: argparse.Namespace, path: Path, notes: Iterable[str]
 
 
 def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
-    """Print `result` as JSON, or the lines for people."""
-    print(json.dumps(result, indent=2) if as_json else "\n".join(lines))
+    """Print `result` as JSON, in which a number that is not finite is null, or the lines for people."""
+    print(json.dumps(_finite(result), indent=2, allow_nan=False) if as_json else "\n".join(lines))
+
+
+def _finite(value):
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def check_count(option: str, number: int | None) -> None:
+    """Refuse a number of threads, processes or cores below 1; None is for the command to choose."""
+    if number is not None and number < 1:
+        raise InputError(f"{option} {number}: give 1 or more.")
 
 
 def check_forces(forces: Iterable[float], spec: "Specification") -> None:
@@ -136,8 +151,8 @@ def check_pictures(*paths: Path | None) -> None:
 
 
 def import_trimesh() -> None:
-    """Import trimesh without packages that it loads wherever they are, which takes a third of a second, and that no command uses
-    through it. In a command's process alone: trimesh works without them from then on."""
+    """Import trimesh without packages that it loads wherever they are, which takes a third of a second, and that commands use
+    through it seldom (`geometry.repair`) or never. In a command's process alone: trimesh works without them from then on."""
     hidden = [name for name in ("cascadio", "meshio", "networkx", "scipy.ndimage", "scipy.optimize") if name not in sys.modules]
     try:
         sys.modules |= dict.fromkeys(hidden)     # type: ignore[arg-type]

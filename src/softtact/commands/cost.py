@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softtact.commands.common import add_command, show
+from softtact.commands.common import add_command, check_count, show
 
 if TYPE_CHECKING:
     from softtact.studies.cost import Cost
@@ -30,6 +30,7 @@ def _cost(options):
     from softtact.studies.cost import read_costs
     from softtact.studies.registry import open_study
 
+    check_count("--cores", options.cores)
     opened = open_study(options.configfile or "config/config.yaml")
     show_costs(opened, opened.costs(read_costs(), Path("results") / opened.name), cores=options.cores, as_json=options.json)
 

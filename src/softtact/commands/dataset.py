@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 import softtact
-from softtact.commands.common import add_command, add_repair, add_unit, check_forces, read_object, sensor_spec, show
+from softtact.commands.common import add_command, add_repair, add_unit, check_count, check_forces, read_object, sensor_spec, show
 from softtact.errors import InputError
 from softtact.outputs import check_outputs
 
@@ -49,6 +49,7 @@ def _dataset(options):
     from softtact.studies.cost import read_costs
 
     check_outputs(options.out)
+    check_count("--workers", options.workers)
     check_name(options.out, options.format)
     spec = sensor_spec(options.sensor)
     forces = sorted(set(options.force or [force for force in _FORCES_N if force <= spec.force_range_n[1]]))

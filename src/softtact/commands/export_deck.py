@@ -16,6 +16,7 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
+from softtact.errors import InputError
 from softtact.outputs import check_outputs, refuse_overwriting
 
 EXAMPLES = """
@@ -42,7 +43,11 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _export_deck(options):
-    return (_export_layered if any_sensor_spec(options.sensor).has_layers else _export_solid)(options)
+    spec = any_sensor_spec(options.sensor)
+    if not spec.has_layers and spec.kind != "solid":
+        raise InputError(f"{spec.name} is a sensor of kind {spec.kind}, of which there is no deck; name one of layers, or of kind "
+                         "solid.")
+    return (_export_layered if spec.has_layers else _export_solid)(options)
 
 
 def _export_solid(options):

@@ -73,6 +73,8 @@ def _fit(options):
 
     check_outputs(options.out, options.plot)
     config = _material(options)
+    if options.skip_rows < 0:
+        raise InputError(f"--skip-rows {options.skip_rows}: give the number of lines above the header, 0 or more.")
     shape, timed = _parted(options)
     refuse_overwriting(_inputs(options, config, shape, timed), {"--out": options.out, "--plot": options.plot})
     check_pictures(options.plot)

@@ -10,6 +10,7 @@ from softtact.commands.common import (
     add_command,
     add_repair,
     add_unit,
+    check_count,
     check_forces,
     check_pictures,
     read_object,
@@ -27,7 +28,7 @@ EXAMPLES = """
 """
 _OF_GRASP = {"unit": None, "force": None, "x": 0.0, "y": 0.0, "angle": 0.0, "mass": None, "scene": None, "lift": True,
              "model": "auto", "policy": "error", "tolerance": 0.01, "sensor": "coro",
-             "shear": False}     # read from the file in a replay
+             "shear": False, "repair": True}     # read from the file in a replay
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -72,6 +73,7 @@ def _grasp(options):
 
     check_output_folder(options.out)
     check_pictures(options.out)
+    check_count("--workers", options.workers)
     made = _replayed(options) if options.replay else _new(options)
     data, scene, record = made
     events = options.out / "events.nc"
@@ -117,7 +119,8 @@ def _replayed(options):
 
     for name, default in _OF_GRASP.items():
         if getattr(options, name) != default:
-            raise InputError(f"--{name} {getattr(options, name)}: it has no effect on --replay, which takes it from the file; "
+            stated = "--no-repair" if name == "repair" else f"--{name} {getattr(options, name)}"
+            raise InputError(f"{stated}: it has no effect on --replay, which takes it from the file; "
                              "leave it out.")
     data = read_events(options.replay)
     facts, record = facts_of(data), record_of(data)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from softtact.commands.common import add_command, show
+from softtact.commands.common import add_command, check_count, show
 from softtact.outputs import check_output_folder
 
 EXAMPLES = """
@@ -30,6 +30,7 @@ def _grasps(options):
     from softtact.studies.cost import cost_lines, origin_of, read_costs
     from softtact.studies.registry import KINDS, OpenStudy
 
+    check_count("--workers", options.workers)
     opened = OpenStudy("grasps", KINDS["grasps"].call("load", KINDS["grasps"].call("read", options.config), options.config))
     folder = options.out or Path("results") / opened.name
     check_output_folder(folder)

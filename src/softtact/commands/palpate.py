@@ -4,8 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from softtact.commands.common import add_command, show
-from softtact.errors import InputError
+from softtact.commands.common import add_command, check_count, show
 from softtact.outputs import check_output_folder
 
 EXAMPLES = """
@@ -25,8 +24,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _palpate(options):
     from softtact.studies.registry import open_study
 
-    if options.threads < 1:
-        raise InputError(f"--threads {options.threads}: give 1 or more.")
+    check_count("--threads", options.threads)
     check_output_folder(options.out)
     opened = open_study(options.design, kind="palpation")
     from softtact.files import read_json

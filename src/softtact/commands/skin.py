@@ -5,8 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from softtact.commands.common import add_command, show
-from softtact.errors import InputError
+from softtact.commands.common import add_command, check_count, show
 from softtact.outputs import check_output_folder
 
 EXAMPLES = """
@@ -39,8 +38,7 @@ def _skin(options):
     from softtact.studies.registry import open_study
 
     opened = open_study(options.design, kind="skin")
-    if options.threads < 1:
-        raise InputError(f"--threads {options.threads}: give 1 or more.")
+    check_count("--threads", options.threads)
     check_output_folder(options.out)
     from softtact.files import read_json
     from softtact.studies.jobs import run_jobs

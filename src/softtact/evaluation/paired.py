@@ -170,7 +170,7 @@ def power(effect: float, *, objects: int | Sequence[int], seeds: int, object_sd:
     seed_sd: of one training against another, the same for all objects; nothing where there is a single seed, of a formula
     By the noncentral t distribution, with degrees of freedom as in `compare`.
     """
-    sizes = [objects] if isinstance(objects, int) else list(objects)
+    sizes = np.atleast_1d(objects).tolist()
     if min(sizes) < 2:
         return 0.0
     parts = [(object_sd**2 / size, size) for size in sizes] + ([(seed_sd**2 / seeds, seeds)] if seeds > 1 else [])

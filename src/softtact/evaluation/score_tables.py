@@ -229,12 +229,13 @@ def verdicts(table: pd.DataFrame, *, architecture: str, sets: Sequence[str] = ("
 
 def _score_sentence(table, model, architecture):
     """One sentence that compares the study's network of a model with predictors without a network, on grasps."""
-    forces = forces_of(table)
-    rows = table[(table.model == model) & (table["set"] == "grasps") & (table.force == forces[-1])]
+    rows = table[(table.model == model) & (table["set"] == "grasps")]
+    largest = forces_of(rows)[-1]      # that grasps reach, which may be less than other sets do
+    rows = rows[rows.force == largest]
     network = rows[rows.predictor == architecture].iloc[0]
     rest = rows[rows.kind.isin(["trivial", "simple"])]
     best = rest.loc[rest.ssim.idxmax()]
     skill = "" if np.isnan(network.skill) else f", skill {network.skill:.2f} over the best trivial one"
-    return (f"At {forces[-1]} N on grasped objects the {architecture} network of the {model} model has SSIM {network.ssim:.3f} "
+    return (f"At {largest} N on grasped objects the {architecture} network of the {model} model has SSIM {network.ssim:.3f} "
             f"and errs by {network.mae_share:.0%} of the mean reading{skill}; the best predictor without a network, "
             f"{best.predictor}, has {best.ssim:.3f} and {best.mae_share:.0%}.")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
 LEVEL, REPEATS = 0.95, 2000
+_FEWEST = 10      # draws beyond a percentile from which it is read
 SHARE = 0.1             # of the reading's largest count, from which a taxel belongs to the contact patch
 FLOOR_COUNTS = 30.0     # least threshold: about four standard deviations of the virtual sensor's offsets and noise together
 TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
@@ -140,7 +141,8 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
     """(low, high) of the mean of `values` (n,), from percentiles over `repeats` draws; items, trials (n,) group the values.
 
     With one item the scatter between items is unknown: (nan, nan). With few, plain percentiles are too narrow (by a third for
-    five), so they are expanded to the width of Student's interval of a normal sample (expanded percentiles, Hesterberg 2015).
+    five), so they are expanded to the width of Student's interval of a normal sample (expanded percentiles, Hesterberg 2015); where
+    such a percentile lies beyond the draws, as of five items and fewer, it is Student's interval of their deviation.
     """
     sums, counts, n_trials = by_trial(values, items, trials)     # (item, trial) each, and (item,)
     if len(n_trials) < 2:
@@ -152,7 +154,11 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
     total, count = ((table[drawn[..., None], picks] * taken).sum(axis=(1, 2)) for table in (sums, counts))
     n = len(n_trials)
     tail = ndtr(-np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.5 * (1 + level)))
-    low, high = np.quantile(total / count, [tail, 1 - tail])
+    means = total / count
+    if tail * repeats < _FEWEST:     # beyond the last draws as if the means were normal
+        half = np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.5 * (1 + level)) * means.std()
+        return float(means.mean() - half), float(means.mean() + half)
+    low, high = np.quantile(means, [tail, 1 - tail])
     return float(low), float(high)
 
 

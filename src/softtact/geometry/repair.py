@@ -170,7 +170,7 @@ def _refuse_double_sided(path, mesh):
     bodies = [piece for piece in walls.split(only_watertight=False) if piece.is_watertight] if len(back_to_back) else []
     rest = _of_faces(mesh.vertices, mesh.faces[keep])
     for body in bodies:
-        trimesh.repair.fix_winding(body)
+        _fix_winding(body)
         if volume_of(body) > 0:
             body.invert()
         if not is_cavity(body, union_of([piece for piece in rest.split(only_watertight=False) if volume_of(piece) > 0])):
@@ -262,12 +262,20 @@ def _patch(mesh, loop):
     return loop[faces], float(trimesh.triangles.area(mesh.vertices[loop[faces]]).sum()), height <= _FLAT_HOLE * _size(mesh)
 
 
+def _fix_winding(mesh):
+    """Orient neighbouring facets consistently, in place, also where trimesh was imported without the package that this needs."""
+    import networkx  # a command's process imports trimesh without it
+
+    trimesh.repair.nx = networkx
+    trimesh.repair.fix_winding(mesh)
+
+
 def _turn_facets(mesh, repairs):
     """Orient neighbouring facets consistently."""
     if mesh.is_winding_consistent:
         return mesh
     turned = mesh.copy()
-    trimesh.repair.fix_winding(turned)
+    _fix_winding(turned)
     changed = (turned.faces != mesh.faces).any(axis=1)
     bodies, of = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces)), None
     for body in range(bodies.max() + 1):     # the orientation of most facets is the body's

@@ -23,7 +23,7 @@ from softtact.sensors.fields import (
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 DEFAULT_KIND = "frusta"     # of a file that states none
-_FILES_OF_READOUTS = ("shading", "background")     # keys of readouts that name files
+FILES_OF_READOUTS = ("shading", "background")     # keys of readouts that name files
 
 
 class ReadoutEntry(BaseModel):
@@ -63,7 +63,7 @@ class Specification(FiniteSection):
     def paths(self) -> list[Path]:
         """All files of the sensor besides its YAML file."""
         named = [self.folder / str(value) for entry in self.readouts.values() for key, value in (entry.model_extra or {}).items()
-                 if key in _FILES_OF_READOUTS]
+                 if key in FILES_OF_READOUTS]
         return [path for path in named if path.is_file()]
 
     def need_layers(self) -> None:

@@ -1,6 +1,6 @@
 """Read and check a study's configuration; an error message names the field, the value and the remedy."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -70,6 +70,12 @@ def refuse_unknown(name: str, known: Collection[str], *, kind: str, where: str) 
     """Raise an `InputError` with the nearest known name if `name` is not one of the `known`."""
     if name not in known:
         raise InputError(_sentence(f"{where}: {unknown(name, known, kind=kind)}"))
+
+
+def refuse_named_twice(names: Sequence[str], *, where: str) -> None:
+    """Raise an `InputError` if a name is there twice."""
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{where}: it names {twice[0]!r} twice; remove one of the two.")
 
 
 def _sentence(text):

@@ -9,10 +9,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt
 
+from softtact.errors import InputError
+from softtact.robot.settings import load_scene
 from softtact.sensors.fields import plain_value
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
-from softtact.studies.configuration import here_or_shipped, read_mapping, read_over, refuse_unknown, validated
+from softtact.studies.configuration import here_or_shipped, read_mapping, read_over, refuse_named_twice, refuse_unknown, validated
 from softtact.studies.hybrid.keys import CatalogueEntry, Law, Name, NotNegative, VirtualSensorKey
 from softtact.studies.hybrid.objects import read_catalogue
 from softtact.unknown_names import Section
@@ -106,11 +108,27 @@ def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> Gra
     where = str(path or "the configuration")
     checked = validated(GraspValues, read_mapping(DEFAULT) | dict(values), where=where)
     catalogue = read_catalogue(here_or_shipped(checked.catalogue))
-    for name in [*checked.objects, *checked.one_event.objects]:
-        refuse_unknown(name, list(catalogue), kind="object", where=f"{where}, at 'objects'")
+    for key, names in (("objects", checked.objects), ("one_event.objects", checked.one_event.objects)):
+        for name in names:
+            refuse_unknown(name, list(catalogue), kind="object", where=f"{where}, at '{key}'")
+        refuse_named_twice(names, where=f"{where}, at '{key}'")
     spec = read_spec(sensor_file(checked.sensor))
+    _check_scene(checked, spec, where)
     items = [item for name in checked.objects for item in _positions(checked, catalogue[name])]
     return GraspStudy(checked, spec, items, catalogue)
+
+
+def _check_scene(values, spec, where):
+    """Refuse forces beyond the sensor's and a faulty scene before any grasp: a grasp that fails is a result."""
+    low, high = spec.force_range_n
+    for key, force_n in (("force_n", values.force_n), ("one_event.force_n", values.one_event.force_n)):
+        if not low < force_n <= high:
+            raise InputError(f"{where}, at '{key}': {force_n:g} N is out of the range of {spec.name}; give a force above {low:g} N "
+                             f"and up to {high:g} N.")
+    try:
+        load_scene(**values.scene)
+    except InputError as error:
+        raise InputError(f"{where}, at 'scene': {error}") from None
 
 
 def _positions(values, entry):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from softtact.errors import InputError
 from softtact.files import read_yaml
 from softtact.inputs import check_input
-from softtact.studies.configuration import refuse_unknown, validated
+from softtact.studies.configuration import refuse_named_twice, refuse_unknown, validated
 from softtact.studies.hybrid.keys import CENTRED, CatalogueEntry, ItemSet
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ class Item:
 def read_catalogue(path: Path) -> dict[str, CatalogueEntry]:
     """{name: CatalogueEntry} with paths of mesh files from the working folder. Raises InputError for a missing mesh."""
     lines = read_yaml(path, missing="there is no such catalogue of objects; correct 'objects.catalogue'.")
+    if not isinstance(lines or [], list):
+        raise InputError(f"{path}: it holds {lines!r:.40}; write a list of objects, as in config/objects/catalogue.yaml.")
     entries = [validated(CatalogueEntry, line, where=str(path)) for line in lines or []]
     entries = [entry.model_copy(update={"file": str(path.parent / entry.file)}) for entry in entries]
     catalogue = {entry.name: entry for entry in entries}
@@ -58,6 +60,7 @@ def items_of_set(set_name: str, chosen: ItemSet, catalogue: dict[str, CatalogueE
     where = f"the configuration, at 'objects.{set_name}'"
     for name in names:
         refuse_unknown(name, known, kind=f"object of set {set_name}", where=where)
+    refuse_named_twice(names, where=where)
     drawn = _dealt(chosen, len(names), where=where)
     items: dict[str, Item] = {}
     for entry, count in zip((catalogue[name] for name in names), drawn, strict=True):

@@ -36,6 +36,8 @@ class Objects(Section):
 
     @model_validator(mode="after")
     def _apart(self):
+        if twice := [name for name in [*self.train, *self.test] if max(self.train.count(name), self.test.count(name)) > 1]:
+            raise ValueError(f"it names {twice[0]!r} twice; remove one of the two")
         if both := sorted(set(self.train) & set(self.test)):
             raise ValueError(f"{both[0]!r} is in both train and test; leave it in one of them")
         return self

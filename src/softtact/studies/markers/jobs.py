@@ -39,6 +39,7 @@ class _Jobs:
         self.pressed_with = {
             "sensor": from_here(found_sensor(study.values.sensor)),
             "materials": [from_here(material_file(name)) for name in study.spec.materials.values()],
+            "images": [from_here(path) for path in study.spec.paths],
         }
         self.parts = list(self._parts())
         self.sequences = [f"{folder}/dataset/{part}.nc" for part, _ in self.parts]

@@ -15,6 +15,7 @@ from softtact.studies.hybrid.keys import Name
 from softtact.unknown_names import Section
 
 DEFAULT = "config/real.yaml"
+MADE = "made"     # in place of a file: what the study draws itself
 DATA_VARIABLE = "SOFTTACT_TEST_DATA"      # names the folder that holds gel/
 _Assumable = BeforeValidator(plain_value)
 
@@ -149,6 +150,12 @@ def read_values(path: str | Path) -> dict[str, Any]:
 def load_study(values: Mapping[str, Any], path: str | Path | None = None) -> RealStudy:
     """The `RealStudy` of a configuration mapping; keys that it leaves out are as in config/real.yaml."""
     return RealStudy(validated(RealValues, read_mapping(DEFAULT) | dict(values), where=str(path or "the configuration")))
+
+
+def gel_files(folder: str | None, pattern: str) -> list[Path]:
+    """Files of the measured data that fit a pattern, in order; none where they are missing, which the stage that reads tells."""
+    place = folder or os.environ.get(DATA_VARIABLE)
+    return sorted(path for path in Path(place, "gel").glob(pattern) if path.is_file()) if place else []
 
 
 def gel_data(folder: str | None, file: str) -> Path:

@@ -11,9 +11,10 @@
 from pathlib import Path
 from typing import Any
 
-from softtact.studies.jobs import Job, figure_files
-from softtact.studies.real.config import RealStudy
+from softtact.studies.jobs import Job, figure_files, from_here
+from softtact.studies.real.config import MADE, RealStudy, gel_files
 
+FOTS_FILES = ("fots/presses.csv", "fots/background.npy", "fots/presses/*")
 FIGURES = ("gel_force", "markers", "shading", "ball_size", "circles")
 
 
@@ -38,14 +39,28 @@ class _Jobs:
         """Copies of the measured data, each with its source."""
         values = self.values
         made = f"{self.folder}/presses/{{set}}"
-        sets = [Job("gather_presses", {}, {"presses": f"{made}.npz", "facts": f"{made}.json"},
+        sets = [Job("gather_presses", self.measured(name), {"presses": f"{made}.npz", "facts": f"{made}.json"},
                     {"set": values.shading.sets[name].model_dump(mode="json"), "data": values.data, "taxim": values.taxim,
                      "seed": values.seed}, {"set": name}, {"set": 1}) for name in self.sets]
         files = {"image": self.markers.image} | {f"other_{number}": file for number, file in enumerate(self.markers.others)}
-        images = [Job("gather_markers", {}, {"markers": f"{self.folder}/markers/{{image}}.csv"},
+        images = [Job("gather_markers", self.measured_markers(file), {"markers": f"{self.folder}/markers/{{image}}.csv"},
                       {"file": file, "data": values.data, "seed": values.seed, "markers": self.made_of()}, {"image": name})
                   for name, file in files.items()]
         return [*sets, *images]
+
+    def measured(self, name: str) -> dict[str, list[str]]:
+        """The measured files of a set, as far as they are here: a change of them gathers it anew."""
+        source, values = self.values.shading.sets[name].source, self.values
+        files = {"fots": [path for pattern in FOTS_FILES for path in gel_files(values.data, pattern)],
+                 "taxim": sorted(Path(values.taxim).glob("*.whl")) if values.taxim else []}
+        return {"files": list(map(from_here, files.get(source, [])))}
+
+    def measured_markers(self, file: str) -> dict[str, list[str]]:
+        """The measured file of an image, if it is here."""
+        if file == MADE:
+            return {"files": []}
+        found = [Path(file)] if Path(file).is_file() else [] if Path(file).is_absolute() else gel_files(self.values.data, file)
+        return {"files": list(map(from_here, found))}
 
     def made_of(self) -> dict[str, object]:
         """What a drawn image of markers is made with."""
