@@ -8,6 +8,7 @@ from support.probes import small_design
 
 from softtact.errors import InputError
 from softtact.probe.design import check_design, load_design
+from softtact.probe.structure import structure_mesh
 
 TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
 
@@ -24,6 +25,7 @@ TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
     ({"tissue": {}}, "did you mean 'tissues'"),
     ({"mesh": {"beam_layers": 3}}, "multiple of 2"),
     ({"mesh": {"tissue": 1e-4}}, "the mesh would have .* elements, more than 200,000; make its sides longer"),
+    ({"mesh": {"edge": 10.0}}, "mesh.edge is 10 mm, .* outside of the supports of 15 mm; give a third of that, 5 mm, or less"),
     ({"geometry": {"support_length": 0.015}}, "geometry.support_length is 0.015"),
     ({"load_n": {"to": 5000.0}}, "load_n.to is 5000.0"),
     ({"displacement_mm": {"by": 1e-6}}, "more than 1000; make them larger"),
@@ -39,6 +41,11 @@ def test_a_files_fault_names_the_file_and_the_variant(tmp_path):
     path.write_text(yaml.safe_dump(values | {"mesh": {}}))
     with pytest.raises(InputError, match=r"design\.yaml: variants\.odd: .*jaw is 'loose'"):
         load_design(path)
+
+
+def test_the_longest_elements_beside_the_supports_edges_leave_the_mesh_as_long_as_the_sensor():
+    mesh = structure_mesh(small_design(mesh={"edge": 5.0}))
+    assert (mesh.points[:, 0].min(), mesh.points[:, 0].max()) == pytest.approx((0.0, 67.0), abs=1e-9)
 
 
 @pytest.mark.parametrize(("part", "young_mpa", "sentence"), [

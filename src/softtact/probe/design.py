@@ -22,6 +22,8 @@ Positive = Annotated[float, Field(gt=0)]
 Length = Annotated[float, Field(ge=0.05, le=1000)]
 _SOFT_MPA, _STIFF_MPA = 20.0, 1e6     # largest Young's modulus of a tissue or filler, and of supports and beam: diamond's
 _MOST_STEPS, _MOST_ELEMENTS = 1000, 200_000
+EDGE_LINES = (1, 3)     # times `mesh.edge`: distances of lines of the mesh from the supports' inner edges, to both sides
+_ROUNDING_MM = 1e-9
 REGIONS = ("left support", "right support", "filler", "beam", "tissue")
 
 
@@ -214,6 +216,11 @@ class PalpationDesign(FiniteSection):
         if self.displacement_mm.to >= self.geometry.tissue_height:
             raise ValueError(f"the jaw's displacement of {self.displacement_mm.to:g} mm is more than the tissue's height; make it "
                              "smaller")
+        longest = self.geometry.support_length / max(EDGE_LINES)
+        if self.mesh.edge and self.mesh.edge > longest + _ROUNDING_MM:     # the mesh would be longer than the sensor
+            raise ValueError(f"mesh.edge is {self.mesh.edge:g} mm, and lines {max(EDGE_LINES)} times as far from the inner edges "
+                             f"would lie outside of the supports of {self.geometry.support_length:g} mm; give a third of that, "
+                             f"{longest:.4g} mm, or less")
         if (count := self._elements()) > _MOST_ELEMENTS:
             raise ValueError(f"the mesh would have {count:.2g} elements, more than {_MOST_ELEMENTS:,}; make its sides longer")
         if self.lump:

@@ -13,7 +13,7 @@ from softtact.fem.structured_meshes import box
 from softtact.materials.laws.base import Law
 from softtact.materials.linear import small_strain_constants
 from softtact.models.solid.body import SolidBody
-from softtact.probe.design import PalpationDesign
+from softtact.probe.design import EDGE_LINES, PalpationDesign
 
 JAW = "jaw"
 _LAYERS = ("base", "beam", "tissue")
@@ -67,7 +67,7 @@ def _edges(design):
     first, (left, right) = design.mesh.edge, design.span("filler")
     if first is None:
         return [left, right]
-    return [edge + side * step * first for edge in (left, right) for step in (0, 1, 3) for side in (-1, 1)]
+    return [edge + side * step * first for edge in (left, right) for step in (0, *EDGE_LINES) for side in (-1, 1)]
 
 
 def _sides(lump):
