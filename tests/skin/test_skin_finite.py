@@ -1,5 +1,6 @@
 """An object on a skin at finite strains: its law, an even squeeze in closed form, and small forces against small strains."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,14 @@ from scipy.optimize import brentq
 from support.skins import small_skin
 
 from softtact.errors import InputError
+from softtact.files import read_dataset, read_json
 from softtact.skin.analysis import CONVERTERS, LayerMeshSizes, Skin, analyse
 from softtact.skin.contact import compression_law, contact_load, press_at_finite_strains, solid_layer
 from softtact.skin.design import LoadChoice
 from softtact.skin.elastomers import Elastomer, read_elastomers
 from softtact.skin.layout import module_layout
+from softtact.skin.loads import Load
+from softtact.studies.skin.stages.readings import press_object, read_taxels
 
 
 def linear(poisson, *, young_mpa=0.2):
@@ -81,6 +85,25 @@ def test_finite_strains_are_for_objects_and_friction_is_for_finite_strains():
     ):
         with pytest.raises(ValidationError, match=sentence):
             LoadChoice(name="one", at_taxel=1, **keys)
+
+
+def test_the_stages_of_a_study_say_where_the_law_is_extrapolated(monkeypatch, tmp_path):
+    """The press is made up: a study presses in one job, and reads what that kept in another one."""
+    def pressed(skin, *_, **__):
+        still = np.zeros_like(skin.layer.mesh.nodes_mm)
+        return Load(np.array([[15.0, 5.66]]), np.ones(1), 0.02, "1 N by a ball", still, indentation_mm=0.3, beyond_tests=0.2)
+
+    monkeypatch.setattr("softtact.skin.contact.press_at_finite_strains", pressed)
+    trimesh.creation.icosphere(subdivisions=1).export(tmp_path / "ball.stl")
+    load = {"name": "ball", "mesh": "ball.stl", "at_taxel": 7, "force_n": 1.0, "strains": "finite"}
+    settings = {"mesh": {"spacing_mm": 5.0, "layers": 1, "field_spacing_mm": 5.0, "field_layers": 1},
+                "elastomer": linear(0.3).model_dump(mode="json")}
+    press_object(inputs={"mesh": tmp_path / "ball.stl"}, outputs={"load": tmp_path / "load.nc"}, settings=settings | {"load": load})
+    made = {name: tmp_path / file for name, file in (("readings", "readings.nc"), ("table", "loads.csv"), ("facts", "loads.json"))}
+    read_taxels(inputs={"pressed": [tmp_path / "load.nc"]}, outputs=made,
+                settings=settings | {"loads": [load], "converter": dataclasses.asdict(CONVERTERS["paper"])})
+    assert "1 N by a ball: the law of the elastomer is extrapolated there." in read_json(made["facts"])["remarks"]
+    assert read_dataset(tmp_path / "load.nc").attrs["indentation_mm"] == 0.3
 
 
 @pytest.mark.slow

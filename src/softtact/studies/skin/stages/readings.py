@@ -20,6 +20,8 @@ from softtact.skin.loads import Load
 from softtact.skin.maps import TaxelLayer, crosstalk, patch_maps
 from softtact.studies.skin.settings import converter_of, design_of, elastomer_of, skin_of
 
+_KEPT = ("pressure_mpa", "words", "indentation_mm", "beyond_tests")     # of a load at finite strains, beside its arrays
+
 
 def press_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Press an object at finite strains.  inputs: mesh;  outputs: load (NetCDF);  settings: of the skin, and load."""
@@ -31,7 +33,7 @@ def press_object(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: d
                                    **_pressed_by(choice))
     data = xarray.Dataset({"point_mm": (("point", "plane"), load.points_mm), "force_n": ("point", load.force_n),
                            "displacement_mm": (("node", "axis"), load.displacement_mm)},
-                          attrs={"pressure_mpa": load.pressure_mpa, "words": load.words})
+                          attrs={name: getattr(load, name) for name in _KEPT})
     write_dataset(outputs["load"], data, seed=None, settings=settings)
 
 
@@ -105,8 +107,8 @@ def _load(choice, skin, elastomer, file):
 def _kept_load(path):
     """Read a load of `press_object`."""
     data = read_dataset(path)
-    return Load(data.point_mm.values, data.force_n.values, data.attrs["pressure_mpa"], data.attrs["words"],
-                data.displacement_mm.values)
+    return Load(data.point_mm.values, data.force_n.values, displacement_mm=data.displacement_mm.values,
+                **{name: data.attrs[name] for name in _KEPT})
 
 
 def _load_table(loads: Mapping[str, Load], readings: Readings, converter: Converter) -> pd.DataFrame:
