@@ -78,6 +78,14 @@ def test_a_curve_that_is_strained_without_stress_by_more_than_the_test_begins_wi
         read_elastomers(tmp_path / "mine.yaml")["gel"].strain(0.001)
 
 
+@pytest.mark.parametrize(("poisson", "limit"), [(0.5, "less than 0.5"), (-1.0, "greater than -1")])
+def test_an_elastomer_without_a_stable_poissons_ratio_is_refused(poisson, limit, tmp_path):
+    (tmp_path / "mine.yaml").write_text(f"elastomers: [{{name: gel, strain_percent: [0, 500, 0, 0], density_g_cm3: 1, "
+                                        f"poisson: {poisson}, permittivity: 3, permittivity_fe: 3}}]")
+    with pytest.raises(InputError, match=rf"mine.yaml, elastomer 1, at 'poisson' \(it is {poisson}\): .* {limit}; correct it"):
+        read_elastomers(tmp_path / "mine.yaml")
+
+
 def test_an_own_elastomer_joins_those_that_ship(tmp_path):
     (tmp_path / "mine.yaml").write_text(
         "elastomers: [{name: gel, strain_percent: [0, 500, 0, 0], density_g_cm3: 1, poisson: 0.45, "

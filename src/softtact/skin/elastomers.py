@@ -4,10 +4,10 @@ import warnings
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import PositiveFloat, ValidationError
+from pydantic import Field, PositiveFloat, ValidationError
 from scipy.optimize import brentq
 
 from softtact.errors import ExtrapolationWarning, InputError
@@ -27,7 +27,7 @@ class Elastomer(FiniteSection):
     name: str
     strain_percent: tuple[float, float, float, float]
     density_g_cm3: PositiveFloat
-    poisson: float
+    poisson: Annotated[float, Field(gt=-1, lt=0.5)]
     permittivity: PositiveFloat
     permittivity_fe: PositiveFloat
     young_gentle_mpa: PositiveFloat | None = None
@@ -102,8 +102,9 @@ def read_elastomers(path: str | Path | None = None) -> dict[str, Elastomer]:
                 elastomer = Elastomer.model_validate(entry)
             except ValidationError as error:
                 fault = first_fault(error)
-                raise InputError(f"{file}, elastomer {number}, at {'.'.join(map(str, fault['loc']))!r}: {fault['msg']}; correct "
-                                 "it.") from None
+                given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
+                raise InputError(f"{file}, elastomer {number}, at {'.'.join(map(str, fault['loc']))!r}{given}: {fault['msg']}; "
+                                 "correct it.") from None
             found[elastomer.name] = elastomer
     return found
 
