@@ -7,7 +7,7 @@ import yaml
 from support.probes import small_design
 
 from softtact.errors import InputError
-from softtact.probe.design import check_design, load_design
+from softtact.probe.design import Material, check_design, load_design
 from softtact.probe.structure import structure_mesh
 
 TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
@@ -22,6 +22,8 @@ TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
     ({"beam": {"poisson": 0.5}}, "less than 0.5"),
     ({"beam": {"bulk_mpa": 5.0}}, "young_mpa and poisson"),
     ({"tissues": {"rubber": TISSUE}}, "yeoh needs its parameters"),
+    ({"filler": {"stretch_window": (1.5, 0.8)}}, "stretch_window is from 1.5 to 0.8; give the lowest .*, below 1"),
+    ({"filler": {"stretch_window": (1.0, 1.5)}}, "stretch_window is from 1 to 1.5; give the lowest .*, below 1"),
     ({"tissue": {}}, "did you mean 'tissues'"),
     ({"mesh": {"beam_layers": 3}}, "multiple of 2"),
     ({"mesh": {"tissue": 1e-4}}, "the mesh would have .* elements, more than 200,000; make its sides longer"),
@@ -46,6 +48,13 @@ def test_a_files_fault_names_the_file_and_the_variant(tmp_path):
 def test_the_longest_elements_beside_the_supports_edges_leave_the_mesh_as_long_as_the_sensor():
     mesh = structure_mesh(small_design(mesh={"edge": 5.0}))
     assert (mesh.points[:, 0].min(), mesh.points[:, 0].max()) == pytest.approx((0.0, 67.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("constants", [
+    {"young_mpa": 0.1, "poisson": 0.4}, {"shear_mpa": 0.03, "bulk_mpa": 0.3},
+    {"law": "ogden1", "parameters": {"mu1": 0.03, "alpha1": 2.0}, "bulk_mpa": 0.3}])
+def test_a_law_has_the_stretch_window_of_its_data_however_its_constants_are_given(constants):
+    assert Material(**constants, stretch_window=(0.8, 1.6), source="a test's").make().stretch_window == (0.8, 1.6)
 
 
 @pytest.mark.parametrize(("part", "young_mpa", "sentence"), [

@@ -48,15 +48,20 @@ class Material(FiniteSection):
             raise ValueError("give shear_mpa and bulk_mpa, young_mpa and poisson, or parameters and bulk_mpa")
         if self.law != "neo_hooke" and self.parameters is None:
             raise ValueError(f"the law {self.law} needs its parameters")
+        if self.stretch_window and not self.stretch_window[0] < 1 < self.stretch_window[1]:
+            low, high = self.stretch_window
+            raise ValueError(f"stretch_window is from {low:g} to {high:g}; give the lowest principal stretch of the data, below 1, "
+                             "and the highest, above 1")
         return self
 
     def make(self) -> Law:
         """The `Law`. Raises InputError for constants that a law does not allow."""
         if self.young_mpa is not None and self.poisson is not None:
             linear = LinearConstants(self.young_mpa, self.poisson)
-            return make_law("neo_hooke", {"c10": linear.mu_mpa / 2}, bulk_modulus=linear.bulk_modulus_mpa)
-        parameters = self.parameters if self.shear_mpa is None else {"c10": self.shear_mpa / 2}
-        law = make_law(self.law, parameters or {}, bulk_modulus=self.bulk_mpa)
+            law = make_law("neo_hooke", {"c10": linear.mu_mpa / 2}, bulk_modulus=linear.bulk_modulus_mpa)
+        else:
+            parameters = self.parameters if self.shear_mpa is None else {"c10": self.shear_mpa / 2}
+            law = make_law(self.law, parameters or {}, bulk_modulus=self.bulk_mpa)
         law.stretch_window = self.stretch_window
         return law
 
