@@ -22,6 +22,8 @@ SMALL = {
     "loads": [{"name": "a", "diameter_mm": 6, "at_taxel": 7, "pressure_kpa": 20}],
 }
 
+BALL = {"name": "m", "mesh": "ball.stl", "at_taxel": 7, "force_n": 1.0}
+
 
 def written(folder, **changes):
     path = folder / "design.yaml"
@@ -97,6 +99,14 @@ def test_the_tiny_design_computes_every_section(tmp_path, capsys):
         ({"loads": [SMALL["loads"][0] | {"area_mm2": 5.0}]}, "diameter_mm and area_mm2; give one of"),
         ({"loads": [SMALL["loads"][0] | {"pressure_kpa": 90}]}, "90 kPa is beyond twice that"),
         ({"loads": [SMALL["loads"][0], SMALL["loads"][0]]}, "two loads are called 'a'"),
+        ({"loads": []}, "at 'loads': a study needs a load or more, and there is none"),
+        ({"loads": [SMALL["loads"][0] | {"force_n": 1.0}]}, "load 'a': a load by diameter_mm has no force_n; leave it out"),
+        ({"loads": [SMALL["loads"][0] | {"turned_deg": [0, 9, 0], "ratio": 2.0, "pixel_mm": 0.1}]},
+         "load 'a': a load by diameter_mm has no pixel_mm or ratio or turned_deg; leave it out"),
+        ({"loads": [BALL | {"pressure_kpa": 10}]}, "load 'm': a load by mesh has no pressure_kpa; leave it out"),
+        ({"loads": [BALL | {"angle_deg": 10}]}, "load 'm': a load by mesh has no angle_deg; leave it out"),
+        ({"module": {"centres_mm": []}}, "at 'module.centres_mm'"),
+        ({"probes": {"modulus_shares": [-0.1, -1.5]}}, "'probes.modulus_shares.1' (it is -1.5): Input should be greater than -1"),
         ({"choice": {"range_kpa": [50, 10]}}, "50 to 10 kPa does not rise"),
     ({"choice": {"target_kpa": 300}}, "at 'choice.target_kpa': no elastomer's curve reaches 300 kPa"),
     ({"elastomer": "SomaFoam"}, "there is no elastomer 'SomaFoam' (did you mean 'SomaFoama'?)"),

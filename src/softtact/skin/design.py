@@ -21,6 +21,9 @@ from softtact.skin.loads import Load, disc, ellipse, mask, refuse_beside
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+_ELLIPSE = {"pressure_kpa", "ratio", "angle_deg"}
+_USED = {"diameter_mm": {"pressure_kpa"}, "area_mm2": _ELLIPSE, "fingertip": _ELLIPSE, "mask": {"pressure_kpa", "pixel_mm"},
+         "mesh": {"unit", "turned_deg", "force_n", "strains", "friction"}}     # keys of a load beside its place, by its shape
 
 
 class Module(FiniteSection):
@@ -31,7 +34,7 @@ class Module(FiniteSection):
     radius_mm: Length = 2.0
     guard_radius_mm: Length = 2.2
     thickness_mm: Length = 2.0
-    centres_mm: tuple[tuple[float, float], ...] | None = None
+    centres_mm: Annotated[tuple[tuple[float, float], ...], Field(min_length=1)] | None = None
 
     def layout(self) -> Layout:
         """Its taxels; overlapping ones are refused."""
@@ -107,6 +110,9 @@ class LoadChoice(FiniteSection):
             raise ValueError(f"load {self.name!r}: friction is for strains: finite; add that or leave friction out")
         if self.mask and self.pixel_mm is None:
             raise ValueError(f"load {self.name!r}: pixel_mm is missing, the side of the mask's pixels")
+        stated = set(self.model_dump(exclude_defaults=True))
+        if unused := sorted(stated & set().union(*_USED.values()) - _USED[shapes[0]]):
+            raise ValueError(f"load {self.name!r}: a load by {shapes[0]} has no {' or '.join(unused)}; leave it out")
         return self
 
     def centre(self, layout: Layout, where: str) -> tuple[float, float]:
@@ -141,7 +147,7 @@ class Probes(FiniteSection):
 
     diameters_mm: tuple[PositiveFloat, ...] = (4.0, 5.0, 6.0, 10.0)
     pressures_kpa: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)
-    modulus_shares: tuple[float, ...] = (-0.1, -0.05, 0.0, 0.05, 0.1)
+    modulus_shares: tuple[Annotated[float, Field(gt=-1)], ...] = (-0.1, -0.05, 0.0, 0.05, 0.1)
     at_taxel: PositiveInt = 7
 
 

@@ -14,6 +14,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from softtact.errors import InputError
 from softtact.skin.design import Choice, PreparedDesign, SkinDesign, bears, check_design, needs_of, prepare, reaches
 from softtact.studies.jobs import Job, figure_files, files_made, from_here
 
@@ -50,6 +51,8 @@ def load(values: Mapping[str, Any], path: str | Path | None) -> SkinStudy:
     """The study of a design's keys and values from a file; raises an InputError of one sentence for the first fault."""
     path = Path(path or "design.yaml")
     design = check_design(values, path)
+    if not design.loads:     # a sensor has none
+        raise InputError(f"{path}, at 'loads': a study needs a load or more, and there is none; add one.")
     return SkinStudy(design.study or path.stem, prepare(design, path), path.parent)
 
 
