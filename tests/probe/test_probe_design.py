@@ -71,6 +71,29 @@ def test_a_modulus_in_pascal_is_asked_for(part, young_mpa, sentence, tmp_path):
         check_design(values, "design.yaml")
 
 
+SEARCH = {"tissue": "rubber", "width": 6, "height": 5, "x": [5, 14.5, 24, 33.5], "depth": [3.5, 6, 9, 12],
+          "stiffness_ratio": [2, 4, 8], "jaw_mm": [0.5, 2], "noise_n": 0.01, "source": "a test's"}
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"hardness": {"tissue_heights": [15, 2], "shares": [0.75, 1]}},
+     "hardness.tissue_heights of 2 mm: .*jaw's displacement of 2 mm is more than the tissue's height"),
+    ({"search": SEARCH | {"width": 10}}, "search.x is from 5 to 33.5 mm, where a lump with a search.width of 10 mm leaves"),
+    ({"search": SEARCH | {"height": 6}}, "search.depth is from 3.5 to 12 mm, where a lump with a search.height of 6 mm leaves"),
+    ({"search": SEARCH | {"jaw_mm": [2, 15]}}, "search.jaw_mm reaches 15 mm, and the tissue is 15 mm high"),
+    ({"search": SEARCH | {"x": [5, 14.5, 24, 34]}}, "search.x reaches 34 mm, beyond the beam's middle at 33.5 mm"),
+    ({"search": SEARCH | {"moves": [-30, 30]}}, "search.moves reach 60 mm"),
+    ({"search": SEARCH | {"stiffness_ratio": [2, 4, 1e5]}}, "search.stiffness_ratio"),
+    ({"search": SEARCH, "films": {"left": {"on": "left support", "side": "top", "start": 0, "end": 9, "source": "a test's"}}},
+     "the film on the left support from 0 to 9 mm has no mirror image"),
+])
+def test_a_study_that_would_fail_after_the_sweeps_is_refused_before_them(changes, said):
+    values = small_design().model_dump(exclude_none=True)
+    assert check_design(values | {"search": SEARCH, "hardness": {"tissue_heights": [10, 15], "shares": [0.75, 1]}}, "design.yaml")
+    with pytest.raises(InputError, match=rf"design.yaml: .*{said}"):
+        check_design(values | changes, "design.yaml")
+
+
 def test_an_unknown_tissue_is_refused_with_those_there_are():
     with pytest.raises(InputError, match="there are rubber"):
         small_design().tissue("liver")

@@ -22,6 +22,7 @@ Positive = Annotated[float, Field(gt=0)]
 Length = Annotated[float, Field(ge=0.05, le=1000)]
 _SOFT_MPA, _STIFF_MPA = 20.0, 1e6     # largest Young's modulus of a tissue or filler, and of supports and beam: diamond's
 _MOST_STEPS, _MOST_ELEMENTS = 1000, 200_000
+_STIFFEST = 1e4         # lump, over its tissue
 EDGE_LINES = (1, 3)     # times `mesh.edge`: distances of lines of the mesh from the supports' inner edges, to both sides
 _ROUNDING_MM = 1e-9
 REGIONS = ("left support", "right support", "filler", "beam", "tissue")
@@ -130,7 +131,7 @@ class Lump(FiniteSection):
     depth: Positive = Field(description="of its middle below the jaw's face of the tissue")
     width: Positive
     height: Positive
-    stiffness_ratio: Annotated[float, Field(gt=0, le=1e4)] = Field(description="its moduli over those of the tissue")
+    stiffness_ratio: Annotated[float, Field(gt=0, le=_STIFFEST)] = Field(description="its moduli over those of the tissue")
 
 
 class Hardness(FiniteSection):
@@ -155,7 +156,8 @@ class LumpSearch(FiniteSection):
     height: Positive
     x: list[float] = Field(min_length=4, description="places along the left half; the right half is their mirror image")
     depth: list[Positive] = Field(min_length=4)
-    stiffness_ratio: list[Annotated[float, Field(gt=1)]] = Field(min_length=3, description="plain tissue, 1, is solved as well")
+    stiffness_ratio: list[Annotated[float, Field(gt=1, le=_STIFFEST)]] = Field(min_length=3, description="plain tissue, 1, is "
+                                                                                                         "solved as well")
     jaw_mm: list[Positive] = Field(min_length=1, description="rising displacements at which the films are read")
     noise_n: Positive = Field(description="standard deviation of a film's reading")
     moves: list[float] = Field([0.0], min_length=1, description="displacement in mm of the sensor back along the tissue for each "
@@ -265,6 +267,19 @@ class PalpationDesign(FiniteSection):
         """
         return validated(PalpationDesign, _changed(self.model_dump(exclude_none=True), changes), where=self.name)
 
+    def mirrored_films(self) -> np.ndarray:
+        """For each film (films,) the number of its mirror image about the middle. Raises InputError for a film without one."""
+        films, length, found = list(self.films.values()), self.geometry.length, []
+        for film in films:
+            on = {"left support": "right support", "right support": "left support"}.get(film.on, film.on)
+            places = [k for k, other in enumerate(films) if other.on == on and other.side == film.side
+                      and np.allclose([other.start, other.end], [length - film.end, length - film.start])]
+            if not places:
+                raise InputError(f"{self.name}: the film on the {film.on} from {film.start:g} to {film.end:g} mm has no mirror "
+                                 "image; the search for a lump needs films that are symmetric about the beam's middle.")
+            found.append(places[0])
+        return np.array(found)
+
     def variant(self, name: str) -> "PalpationDesign":
         """The design of one of its variants. Raises InputError where its values do not fit."""
         return self.with_(variants={}, variant_steps=self.variant_steps, **self.variants[name])
@@ -287,6 +302,7 @@ def check_design(values: object, path: str | Path) -> PalpationDesign:
     """The design of keys and values that were read from a file. Raises InputError, one sentence with file, field and remedy."""
     design = validated(PalpationDesign, values, where=str(path))
     _refuse_materials(design, str(path))
+    _refuse_studies(design, str(path))
     for name in design.variants:
         try:
             variant = design.variant(name)
@@ -294,6 +310,44 @@ def check_design(values: object, path: str | Path) -> PalpationDesign:
             raise InputError(f"{path}: variants.{name}: {error}") from None
         _refuse_materials(variant, f"{path}: variants.{name}")
     return design
+
+
+def refuse_search(design: PalpationDesign, search: LumpSearch) -> None:
+    """Refuse, with an InputError, a search that cannot be solved.
+
+    Its films are not symmetric about the middle, lumps lie beyond it or leave the tissue, the jaw presses through the tissue, or no
+    lump is within the table in every press.
+    """
+    design.mirrored_films()
+    middle, height, first = design.geometry.middle, design.geometry.tissue_height, search.x[0]
+    if search.x[-1] > middle + _ROUNDING_MM:
+        raise InputError(f"search.x reaches {search.x[-1]:g} mm, beyond the beam's middle at {middle:g} mm; give the left half "
+                         "alone.")
+    if search.jaw_mm[-1] >= height:
+        raise InputError(f"search.jaw_mm reaches {search.jaw_mm[-1]:g} mm, and the tissue is {height:g} mm high; make it smaller.")
+    for place, side, end in (("x", "width", 2 * middle), ("depth", "height", height)):
+        values, size = getattr(search, place), getattr(search, side)
+        if not 0.5 * size < values[0] <= values[-1] < end - 0.5 * size:
+            raise InputError(f"search.{place} is from {values[0]:g} to {values[-1]:g} mm, where a lump with a search.{side} of "
+                             f"{size:g} mm leaves the tissue of {end:g} mm; move it inwards, or make it smaller.")
+    reach = max(search.moves) - min(search.moves)
+    if 2 * (middle - first) <= reach:
+        raise InputError(f"search.moves reach {reach:g} mm, and the table of lumps {2 * (middle - first):g} mm, from {first:g} to "
+                         f"{2 * middle - first:g} mm; move the sensor less.")
+
+
+def _refuse_studies(design, where):
+    """Refuse what would fail only after the sweeps: heights of tissue that the jaw presses through, and searches."""
+    for height in design.hardness.tissue_heights if design.hardness else ():
+        try:
+            design.with_(geometry={"tissue_height": height}, variants={}, hardness=None, search=None)
+        except InputError as error:
+            raise InputError(f"{where}: hardness.tissue_heights of {height:g} mm: {error}") from None
+    if design.search:
+        try:
+            refuse_search(design, design.search)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
 
 
 def _refuse_materials(design, where):

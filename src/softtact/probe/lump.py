@@ -22,7 +22,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.stats import chi2, ncx2
 
 from softtact.errors import InputError
-from softtact.probe.design import LumpSearch, PalpationDesign
+from softtact.probe.design import LumpSearch, PalpationDesign, refuse_search
 from softtact.probe.sweep import palpate
 
 PARAMETERS = ("x_mm", "depth_mm", "log_ratio")
@@ -115,13 +115,10 @@ def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
     """Solve all lumps of a search. The right half of the table is the mirror image, left and right film exchanged.
 
     A lump's forces are those of plain tissue plus the change by the lump on one mesh, which removes the effect of the mesh.
-    Raises InputError where the films are not symmetric about the middle, or a lump does not fit into the tissue.
+    Raises InputError as `refuse_search`.
     """
-    mirror, middle = _mirror(design), design.geometry.middle
-    if search.x[-1] > middle + 1e-9:
-        raise InputError(f"search.x reaches {search.x[-1]:g} mm, beyond the beam's middle at {middle:g} mm; give the "
-                         "left half alone.")
-    _check_moves(search, 2 * middle)
+    refuse_search(design, search)
+    mirror, middle = design.mirrored_films(), design.geometry.middle
     plain = _solved(design, search, None, 0.0, 1.0, threads)
     rows: list[np.ndarray] = []
     ratios = [1.0, *search.stiffness_ratio]
@@ -137,28 +134,6 @@ def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
     return LumpTable(places, np.array(search.depth), np.array(ratios),
                      np.concatenate([left, right]).reshape(len(places), *shape[1:3], -1), plain, search.noise_n,
                      np.array(search.moves))
-
-
-def _check_moves(search, length):
-    """Refuse moves by which no lump lies within the table in every press."""
-    nearest, reach = search.x[0], max(search.moves) - min(search.moves)
-    if length - 2 * nearest <= reach:
-        raise InputError(f"search.moves reach {reach:g} mm, and the table of lumps {length - 2 * nearest:g} mm, from {nearest:g} "
-                         f"to {length - nearest:g} mm; move the sensor less.")
-
-
-def _mirror(design):
-    """For each film the number of its mirror image."""
-    films, length, found = list(design.films.values()), design.geometry.length, []
-    for film in films:
-        on = {"left support": "right support", "right support": "left support"}.get(film.on, film.on)
-        places = [k for k, other in enumerate(films) if other.on == on and other.side == film.side
-                  and np.allclose([other.start, other.end], [length - film.end, length - film.start])]
-        if not places:
-            raise InputError(f"{design.name}: the film on the {film.on} from {film.start:g} to {film.end:g} mm has no mirror "
-                             "image; the search for a lump needs films that are symmetric about the beam's middle.")
-        found.append(places[0])
-    return np.array(found)
 
 
 def find_lump(table: LumpTable, readings_n: np.ndarray) -> FoundLump:
