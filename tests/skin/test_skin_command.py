@@ -109,6 +109,8 @@ def test_the_tiny_design_computes_every_section(tmp_path, capsys):
         ({"probes": {"modulus_shares": [-0.1, -1.5]}}, "'probes.modulus_shares.1' (it is -1.5): Input should be greater than -1"),
         ({"choice": {"range_kpa": [50, 10]}}, "50 to 10 kPa does not rise"),
     ({"choice": {"target_kpa": 300}}, "at 'choice.target_kpa': no elastomer's curve reaches 300 kPa"),
+    ({"choice": {"range_kpa": [10, 90]}, "search": {"elastomers": ["Ecoflex 00-30", "SomaFoama"]}},
+     "at 'search.elastomers' and 'choice.range_kpa': elastomer SomaFoama: its curve was tested up to 42.2 kPa, and 90 kPa is"),
     ({"elastomer": "SomaFoam"}, "there is no elastomer 'SomaFoam' (did you mean 'SomaFoama'?)"),
         ({"converter": {"name": "papr"}}, "there is no converter 'papr'; did you mean 'paper'?"),
         ({"module": {"pitch": 5}}, "at 'module': there is no key 'pitch'; did you mean 'pitch_mm'?"),

@@ -362,11 +362,13 @@ def _refuse_places(design, layout, folder, where):
 
 
 def _refuse_search(design, elastomers, where):
-    """Refuse unknown elastomers, and modules without place for their taxels."""
+    """Refuse unknown elastomers, those that do not bear the range of pressure, and modules without place for their taxels."""
     if design.search is None:
         return
+    highest = 1e-3 * (design.choice or Choice()).range_kpa[1]
     for name in design.search.elastomers or ():
-        find_elastomer(name, elastomers, where=f"{where}, at 'search.elastomers'")
+        elastomer = find_elastomer(name, elastomers, where=f"{where}, at 'search.elastomers'")
+        _refuse_pressures(elastomer, {"at 'search.elastomers' and 'choice.range_kpa'": [highest]}, where)
     gap = design.module.guard_radius_mm - design.module.radius_mm
     for radius in design.search.radii_mm:
         for pitch in design.search.pitches_mm:
