@@ -100,6 +100,20 @@ def test_commas_for_decimals_are_read_and_reported(archive, tmp_path):
     assert all("decimals are written with ','" in f.what for f in comma.outliers.findings) and len(comma.outliers.findings) == 6
 
 
+def test_a_text_amid_decimal_commas_costs_its_own_test_alone(archive, tmp_path):
+    real = archive.real["Flat"].copy()
+    archive.real["Flat"].tax9 = real.tax9.map(lambda value: str(value).replace(".", ","))
+    set_value(archive, FLAT_REAL, 2, "tax9", "n/d")
+    set_value(archive, FLAT_REAL, 7, "tax9", "1.234,5")
+    tables = read(archive.write(tmp_path, sep=";", decimal=","))
+    left_out = [f for f in tables.outliers.findings if f.done == "left out"]
+    assert [(f.row, f.path, f.what) for f in left_out] == [
+        (FIRST[FLAT_REAL] + 2, "EchoH/test_0", "'n/d' in place of a number"),
+        (FIRST[FLAT_REAL] + 7, "EchoH/test_1", "'1.234,5' in place of a number")]
+    test = tables.tests["flat"][0]
+    assert np.array_equal(tables.readings("flat", test), np.float32(real[real.Path == test.path].iloc[:, 1:29]))
+
+
 # Where the test EchoH/test_0 begins: four tests of five frames go before.
 FIRST = {FLAT_REAL: 4 * 5 + 2, FLAT_MAPS: 4 * 5 * 57 + 2}
 

@@ -166,18 +166,24 @@ def _arrays(piece, layout, codes, texts):
     start = piece.index[0]
     piece = piece.drop(columns=len(layout.columns))
     blank = piece.isna().all(axis=1).to_numpy()
-    values = np.column_stack([_numbers(piece[k], texts) for k in layout.numbers])
-    force_n = _numbers(piece[layout.force], texts) if layout.force is not None else np.full(len(piece), np.nan)
+    values = np.column_stack([_numbers(piece[k], layout.decimal, texts) for k in layout.numbers])
+    force_n = _numbers(piece[layout.force], layout.decimal, texts) if layout.force is not None else np.full(len(piece), np.nan)
     test = _codes(piece[layout.path].str.strip(), codes)
     line = start + 2 + np.arange(len(piece))
     return tuple(array[~blank] for array in (values.astype(np.float32), force_n, test, line, surplus))
 
 
-def _numbers(column, texts):
-    """A column as float64, nan for cells without a number, whose texts are kept by line."""
+def _numbers(column, decimal, texts):
+    """A column as float64, nan for cells without a number, whose texts are kept by line.
+
+    One text in a column is enough for pandas to leave all its cells as texts, with their decimal sign.
+    """
     if pd.api.types.is_numeric_dtype(column) and column.dtype != bool:
         return column.to_numpy(dtype=float)
-    numbers = pd.to_numeric(column.astype(object), errors="coerce").to_numpy(dtype=float)
+    cells = column.astype(object)
+    if decimal == ",":
+        cells = cells.astype(str).str.replace(",", ".").where(column.notna())
+    numbers = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=float)
     for at in np.flatnonzero(np.isnan(numbers) & column.notna().to_numpy())[: max(0, TEXTS_KEPT - len(texts))]:
         texts.setdefault(int(column.index[at]) + 2, str(column.iloc[at]))
     return numbers
