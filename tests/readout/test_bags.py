@@ -102,6 +102,31 @@ def test_several_topics_are_told_and_one_is_named(tmp_path):
         with_force_of(read_bag(path, topics=["/left"]), path)
 
 
+def bag_with_baselines(path, **baselines):
+    """Two sensors that read 9,100 counts, and baselines {topic: counts}, with __ in place of /."""
+    topics = {"/left/data": 9100, "/right/data": 9100} | {name.replace("__", "/"): counts for name, counts in baselines.items()}
+    return bag_of(path, [(topic, "std_msgs/msg/Int32MultiArray", k + 1, array([counts] * 28))
+                         for k in range(3) for topic, counts in topics.items()])
+
+
+@pytest.mark.parametrize(("baselines", "topics", "counts", "taken"), [
+    ({"__left__baseline": 9000, "__right__baseline": 9050}, ["/right/data"], 50, "/right/baseline"),
+    ({"__left__baseline": 9000, "__right__baseline": 9050}, ["/left/data"], 100, "/left/baseline"),
+    ({"__left__baseline": 9000, "__right__baseline": 9050}, ["/left/data", "/right/baseline"], 50, "/right/baseline"),
+    ({"__rest__baseline": 9020}, ["/right/data"], 80, "/rest/baseline")])
+def test_of_several_baselines_that_of_the_topic_read_is_taken_off_and_named(tmp_path, baselines, topics, counts, taken):
+    one = read_bag(bag_with_baselines(tmp_path / "b.mcap", **baselines), topics=topics)
+    assert (one.counts.values == counts).all() and f"{taken} has their baseline" in one.attrs["notes"][0]
+
+
+def test_baselines_of_which_none_is_that_of_the_topic_read_are_told_and_one_is_named(tmp_path):
+    path = bag_with_baselines(tmp_path / "b.mcap", __a__baseline=9000, __b__baseline=9050)
+    with pytest.raises(InputError, match=r"the baseline of /left/data: /a/baseline, /b/baseline; name one \(--topic\)"):
+        read_bag(path, topics=["/left/data"])
+    assert (read_bag(path, topics=["/left/data", "/b/baseline"]).counts.values == 50).all()
+    assert (read_bag(path, topics=["/left/data"], baseline="subtracted").counts.values == 9100).all()
+
+
 
 
 @pytest.mark.parametrize(("change", "sentence"), [

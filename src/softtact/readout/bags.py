@@ -4,7 +4,7 @@ Taxels are read from any message with one field of 28 or 56 numbers: those of th
 Sensor, github.com/robotiq/ros), std_msgs/msg/...MultiArray, tactile_msgs/msg/TactileState; 56 are finger 0, then finger 1.
 Definitions of messages come from the bag, or from ROS 2's own where it has none. Forces are `force.z` of a Wrench or WrenchStamped,
 or a std_msgs/msg/Float32 or Float64, in N. Readings are raw where a topic that ends with `baseline` has their baseline, or by their
-size.
+size. Of several such topics that in the namespace of the taxels is theirs.
 """
 
 from collections.abc import Iterator, Sequence
@@ -48,10 +48,10 @@ def read_bag(path: str | Path, *, baseline: str = "auto", topics: Sequence[str] 
     path = Path(path)
     with _opened(path) as bag:
         series = bag.only(_taxels, topics, "taxels (messages with 28 or 56 numbers)")
-        rest = [one for one in bag.all(_taxels, ()) if one.topic.endswith("baseline")]
+        rest = None if baseline == "subtracted" else bag.baseline_of(series.topic, topics)
     stamps, repairs = running_forward(path, series.time_s(), range(len(series.values)), unit="s")
     values, fingers = np.array(series.values), len(series.values[0]) // TAXELS
-    base, words = _baseline(values, rest[0].values[0] if rest else None, baseline)
+    base, words = _baseline(values, rest, baseline)
     shape = (-1, fingers, ROWS, COLUMNS)
     made = make_recording(stamps - stamps[0], (values - base).reshape(shape), baseline=np.reshape(base, shape[1:]),
                           start_ms=round(1e3 * stamps[0]), source=f"ROS 2 bag, {series.type}", file=str(path), repairs=repairs)
@@ -178,6 +178,16 @@ class _Bag:
                              "topic.")
         return chosen[0]
 
+    def baseline_of(self, topic, topics):
+        """The series of a topic's baseline: named in `topics`, or of its namespace, or the only one; None without one."""
+        found = [one for one in self.all(_taxels, ()) if one.topic.endswith("baseline")]
+        beside = [one for one in found if one.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
+        chosen = {one.topic: one for one in reversed([one for one in found if one.topic in topics] or beside or found)}
+        if len(chosen) > 1:
+            raise InputError(f"{self.path}: several topics may have the baseline of {topic}: {', '.join(sorted(chosen))}; name one "
+                             "(--topic).")
+        return next(iter(chosen.values()), None)
+
     def pair(self, value_of, topics):
         """The two topics that end with _0 and _1, one for each finger; None if there are no such."""
         found = {one.topic: one for one in self.all(value_of, topics)}
@@ -244,10 +254,10 @@ def _force(message):
     return float(data) if isinstance(data, float) else None
 
 
-def _baseline(values, known, form):
-    """Baseline (taxel,) to take off values (time, taxel), and words on it."""
-    if known is not None and len(known) == values.shape[1] and form != "subtracted":
-        return np.array(known), "they are raw, and the bag has their baseline"
+def _baseline(values, rest, form):
+    """Baseline (taxel,) to take off values (time, taxel), and words on it.  rest: series of the baseline's topic, or None"""
+    if rest is not None and len(rest.values[0]) == values.shape[1]:
+        return np.array(rest.values[0]), f"they are raw, and {rest.topic} has their baseline"
     low = float(np.median(np.quantile(values, _LOW, axis=0)))
     if form == "subtracted" or (form == "auto" and low < _RAW):
         return np.zeros(values.shape[1]), "they are taken to be over the baseline already"
