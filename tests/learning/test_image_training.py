@@ -191,6 +191,17 @@ def test_sequences_are_read_from_files(tmp_path):
         open_sequences(paths, split="unseen")
 
 
+def test_sequences_pressed_anew_into_a_file_of_the_same_size_have_another_digest(tmp_path):
+    path, other, digests, sizes = tmp_path / "a.nc", tmp_path / "b.nc", [], set()
+    for start in (0, 100, 0):
+        _write_sequences(path, ["train"], start)
+        digests.append(open_sequences([path], split="train").digest())
+        sizes.add(path.stat().st_size)
+    assert len(sizes) == 1 and digests[0] != digests[1]
+    other.write_bytes(path.read_bytes())
+    assert open_sequences([other], split="train").digest() == digests[2]
+
+
 def test_a_file_without_sequences_is_refused(tmp_path):
     path = tmp_path / "other.nc"
     path.write_bytes(b"not a data set")

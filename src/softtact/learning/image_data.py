@@ -5,6 +5,7 @@ and `image` (frame, y, x, channel) uint8, with the labels `sequence`, `split` an
 together, in their order in time.
 """
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ class ImageSequences:
     length: np.ndarray
     """(sequence,) frames of each sequence."""
     origin: str
-    """What the digest of a training takes for the contents."""
+    """What the digest of a training takes for the contents: a hash of the files' bytes."""
 
     def __len__(self) -> int:
         return len(self.first)
@@ -86,8 +87,13 @@ def open_sequences(paths: Sequence[str | Path], *, split: str, longest_only: boo
     if not first:
         raise InputError(f"the data set: no sequence is of the split {split!r}; press more poses.")
     kept = np.array(length) == max(length) if longest_only else np.ones(len(first), dtype=bool)
-    origin = digest([[Path(path).name, Path(path).stat().st_size] for path in paths])
-    return ImageSequences(grey, image, np.array(first)[kept], np.array(length)[kept], origin)
+    return ImageSequences(grey, image, np.array(first)[kept], np.array(length)[kept], digest([_hash_of(path) for path in paths]))
+
+
+def _hash_of(path):
+    """SHA-256 of a file's bytes, read in pieces: a file pressed anew with other settings may have the same name and size."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _bytes_of(path):
