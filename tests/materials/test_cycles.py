@@ -79,6 +79,20 @@ def test_one_amplitude_fixes_the_width_of_the_softening_and_not_its_two_constant
     assert any("one amplitude, which does not tell m and beta apart" in text for text in found.warnings)
 
 
+def test_jitter_at_the_start_is_no_second_amplitude():
+    stretch = np.concatenate([[1.0, 1.004, 1.002], cycles_to(2.5, 2.5, start=1.005)])
+    found = fit_mullins(LAW, [softening_test(stretch)])
+    assert not found.several and found.effect.beta == 0 and found.not_identifiable == ["beta"]
+
+
+@pytest.mark.parametrize("share", [1.0, 1e-3])
+def test_a_width_that_cycles_do_not_determine_is_told_of_soft_and_stiff_materials_alike(share):
+    """Under noise two large amplitudes determine m + beta W_max, not its small part m."""
+    law = make_law("yeoh", {name: share * value for name, value in LAW.parameters.items()})
+    test = softening_test(cycles_to(2.0, 2.5), law=law, effect=Mullins(1.8, share * 0.01, 0.2), noise=0.03)
+    assert fit_mullins(law, [test]).not_identifiable == ["m_mpa"]
+
+
 def test_an_unloading_that_hardly_begins_does_not_fix_r():
     stretch = np.concatenate([np.linspace(*ends, 20) for ends in ((1, 1.5), (1.5, 1.49), (1.5, 2.5), (2.5, 2.49))])
     found = fit_mullins(LAW, [softening_test(stretch, noise=0.002)])

@@ -27,9 +27,10 @@ from softtact.materials.uncertainty import covariance_of
 
 FIRST, STEADY, MULLINS = CYCLES = ("first", "steady", "mullins")
 _ONE_AMPLITUDE = 1.2    # ratio of the greatest energies below which the data do not part m and beta
+_NO_AMPLITUDE = 0.02    # share of the greatest energy below which rows are jitter at the test's start, no amplitude
 _LARGEST_ERROR = 0.25   # of the softened stress, root mean square: above, the effect does not describe these cycles
 _LARGEST_R = 100.0      # the softening is below 1 % there
-_LOOSE = 0.01           # a constant with a smaller standard error, in MPa or 1, is determined, even if it is zero
+_LOOSE = 0.01           # a constant with a smaller standard error, as _STARTS in 1 or mean W_max, is determined, even if it is 0
 _FEWEST = 4             # rows of unloading and reloading
 _STARTS = ((1.3, 3.0), (0.1, 0.5, 2.0), (0.02, 0.2))    # r; m over the mean W_max; beta
 
@@ -134,7 +135,8 @@ def fit_mullins(law: Law, tests: Sequence[CyclicTest], *, window: Mapping[str, S
         raise InputError(f"{tests[0].history.source}: {len(data.measured)} row(s) of unloading with a stress are too few for the "
                          "Mullins effect; widen the window, or take --cycles first.")
     scale, largest = float(np.mean(data.greatest)), float(np.abs(data.measured).max())
-    several = bool(data.greatest.max() > _ONE_AMPLITUDE * data.greatest.min())
+    amplitudes = data.greatest[data.greatest >= _NO_AMPLITUDE * data.greatest.max()]
+    several = bool(amplitudes.max() > _ONE_AMPLITUDE * amplitudes.min())
     count = 3 if several else 2
 
     def residual(constants):
@@ -147,17 +149,20 @@ def fit_mullins(law: Law, tests: Sequence[CyclicTest], *, window: Mapping[str, S
     found = [least_squares(residual, unit * start, bounds=bounds, x_scale="jac") for start in starts]
     best = min(found, key=lambda one: one.cost)
     effect = Mullins(*np.append(best.x, [0.0])[:3].tolist())
-    return _report(law, effect, residual, np.linalg.norm(data.measured) / largest, several)
+    return _report(law, effect, residual, np.linalg.norm(data.measured) / largest, several, unit)
 
 
-def _report(law, effect, residual, size, several):
-    """`MullinsFit` of the best effect; residual: function of r, m and, with several amplitudes, beta;  size: of the data."""
+def _report(law, effect, residual, size, several, unit):
+    """`MullinsFit` of the best effect; residual: function of r, m and, with several amplitudes, beta;  size: of the data
+
+    unit: of each constant, so that the report is the same for soft and stiff materials
+    """
     names = ["r", "m_mpa", "beta"][:3 if several else 2]
     constants = np.array([getattr(effect, name) for name in names])
-    error, steps = residual(constants), np.diag(1e-7 * np.maximum(constants, 1e-3))
+    error, steps = residual(constants), np.diag(1e-7 * np.maximum(constants, 1e-3 * unit))
     jacobian = np.stack([(residual(constants + step) - error) / step.sum() for step in steps], axis=1)
     covariance = covariance_of(jacobian, float(error @ error) / max(len(error) - len(constants), 1))
-    known = np.maximum(constants - [1, 0, 0][:len(names)], _LOOSE)
+    known = np.maximum(constants - [1, 0, 0][:len(names)], _LOOSE * unit)
     deviation = np.full(len(names), np.inf) if covariance is None else np.sqrt(np.diag(covariance))
     return MullinsFit(
         effect=effect, law=law.name, relative_error=float(np.linalg.norm(error) / size), points=len(error), several=several,
