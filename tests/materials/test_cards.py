@@ -317,6 +317,14 @@ def test_youngs_modulus_has_the_error_that_what_is_left_of_the_points_gives():
     assert found == pytest.approx((0.5, d * np.sqrt(5 / 0.025), d * np.sqrt(10 / 4)))
 
 
+def test_a_curve_that_begins_slack_gives_a_card_without_linear_constants_and_a_warning():
+    stretch = np.linspace(1.0, 1.6, 61)
+    taut = make_law("neo_hooke", {"c10": 0.2}).nominal_stress("uniaxial", np.maximum(stretch - 0.06, 1.0))
+    card = make_card([Curve("uniaxial", stretch, taut, "measured", "slack.csv")], laws=["yeoh"], poisson=0.49)
+    assert "linear" not in card["laws"] and card["chosen"] == "yeoh"
+    assert any("begins slack, within a strain of 0.1; take the slack off, or raise" in text for text in card["warnings"])
+
+
 def test_two_tests_are_enough_to_leave_one_out(curves_of):
     card = make_card(curves_of("neo_hooke", {"c10": 0.2}, modes={"uniaxial": (0.7, 1.5), "planar": (0.8, 1.5)}), laws=["neo_hooke"])
     assert set(card["laws"]["neo_hooke"]["left_out"]) == {"uniaxial", "planar"}

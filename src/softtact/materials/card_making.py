@@ -238,6 +238,9 @@ def _linear_entry(curves, bulk, options):
         young, error, rmse = young_modulus(curves, small_strain=options.small_strain)
     except InputError as refusal:
         return {}, [f"No linear constants: {refusal}"]
+    if not young > 0:
+        return {}, [f"No linear constants: Young's modulus would be {young:.3g} MPa, as the uniaxial curve falls, or begins slack, "
+                    f"within a strain of {options.small_strain:g}; take the slack off, or raise small_strain."]
     stated = options.poisson is not None
     linear = LinearConstants(young, options.poisson if stated else poisson_ratio(young, bulk.modulus_mpa))
     entry = {
