@@ -93,6 +93,12 @@ def test_an_unknown_name_is_refused_with_those_that_ship():
         Shading.load("nobodys_gel")
 
 
+def test_a_folder_with_the_name_of_a_shading_that_ships_does_not_hide_it(tmp_path, monkeypatch):
+    (tmp_path / "digit").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert Shading.load("digit").pixels
+
+
 def test_a_camera_of_another_ratio_is_refused_and_one_of_another_size_scaled():
     model, y_x = fitted(QuadraticShading, TRUE), (np.array([10.0]), np.array([12.0]))
     with pytest.raises(InputError, match="calibrated on images of 64 x 48 px, the camera has 64 x 64 px, of another ratio"):

@@ -199,6 +199,20 @@ def test_a_camera_that_does_not_fit_is_refused_in_one_sentence_when_the_sensor_i
     assert str(refused.value).startswith(str(tmp_path / "mine.yaml")) and str(refused.value).count(". ") <= 1
 
 
+def test_a_shading_s_file_is_looked_for_beside_the_sensor_s_file_alone(tmp_path, monkeypatch):
+    from softtact.imaging.shading import Shading
+
+    for folder in ("sensor", "work"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "sensor" / "mine.yaml").write_text(yaml.safe_dump(gel_values(shading="lit.yaml")))
+    monkeypatch.chdir(tmp_path / "work")
+    Shading.load("gelsight_wonkdim").save("lit.yaml")
+    with pytest.raises(InputError, match="sensor.lit.yaml: there is no such shading"):
+        softtact.load_sensor(tmp_path / "sensor" / "mine.yaml")
+    (tmp_path / "work" / "lit.yaml").rename(tmp_path / "sensor" / "lit.yaml")
+    assert softtact.load_sensor(tmp_path / "sensor" / "mine.yaml")
+
+
 def test_a_background_of_another_size_is_refused(tmp_path):
     from PIL import Image
 

@@ -146,7 +146,7 @@ class Shading(ABC):
         """The model of a file, or one that ships with the package, by its name (`gelsight_mini`)."""
         path = Path(name)
         shipped = SHIPPED / f"{name}.yaml"
-        path = shipped if not path.exists() and shipped.exists() else path
+        path = shipped if not path.is_file() and shipped.is_file() else path
         known = ", ".join(sorted(one.stem for one in SHIPPED.glob("*.yaml")))
         values = read_yaml(path, missing=f"there is no such shading; give the path of a file, or one of: {known}.")
         return _from_values(values, path)

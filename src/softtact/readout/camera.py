@@ -183,7 +183,7 @@ def camera_of(spec: Specification, name: str) -> Camera:
 
 def _shading_of(camera, folder):
     file = folder / camera.shading
-    shading = Shading.load(file if file.is_file() else camera.shading)
+    shading = Shading.load(file if file.is_file() or file.suffix else camera.shading)     # only a plain name may be one that ships
     if tuple(shading.pixels) == camera.pixels:
         return shading
     try:
