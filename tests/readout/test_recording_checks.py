@@ -180,6 +180,13 @@ def test_a_clock_that_is_set_back_or_starts_anew_is_told_and_counted_on(wrong, b
     assert time + back == pytest.approx(ms) and len(repairs) == 1 and sentence in repairs[0]
 
 
+def test_a_counter_that_starts_anew_again_and_again_is_counted_on_each_time():
+    ms = 1000 + 100.0 * np.arange(2000)
+    time, repairs = running_forward("r.csv", ms % 2**16, range(2000), unit="ms")
+    assert time == pytest.approx(ms) and len(repairs) == 3
+    assert "row 1957: the time starts anew after 65528 ms, as a counter does that ends at 65536" in repairs[2]
+
+
 def test_two_recordings_in_one_file_are_refused():
     with pytest.raises(InputError, match="row 50: time runs back from 1490 to 1000 ms; are these two recordings"):
         running_forward("r.csv", np.tile(1000 + 10.0 * np.arange(50), 2), range(100), unit="ms")

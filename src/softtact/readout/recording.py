@@ -197,12 +197,13 @@ def running_forward(path: Path, time: np.ndarray, rows: Sequence[int], *, unit: 
     A counter that starts anew is counted on. A clock that is set back by a little goes on after its usual step. Raises InputError,
     with the file's row, for other steps back: they are of two recordings in one file.
     """
-    time, told = np.array(time, dtype=float), []
+    stated = np.array(time, dtype=float)
+    time, told = stated.copy(), []
     if len(time) >= _ROWS_OF_A_CLOCK and np.ptp(time) == 0:
         raise InputError(f"{path}, rows {rows[0]} to {rows[-1]}: all have the time {time[0]:.15g} {unit}; record again with the "
                          "clock running.")
     for at in map(int, np.flatnonzero(np.diff(time) < 0)):
-        before, after = time[at], time[at + 1]
+        before, after = stated[at], stated[at + 1]
         steps = np.diff(time)
         usual = float(np.median(steps[steps > 0])) if len(time) >= _ROWS_OF_A_CLOCK and (steps > 0).any() else 0.0
         where, back = f"{path}, row {rows[at + 1]}", before - after
@@ -211,7 +212,8 @@ def running_forward(path: Path, time: np.ndarray, rows: Sequence[int], *, unit: 
             told.append(f"{where}: the time starts anew after {before:.15g} {unit}, as a counter does that ends at {wrap:.15g}; "
                         "it is counted on.")
             time[at + 1:] += wrap
-        elif usual and after > time[0] and back <= min(_STEP_BACK_S * (1e3 if unit == "ms" else 1), 0.5 * (before - time[0])):
+        elif (usual and time[at + 1] > time[0]
+              and back <= min(_STEP_BACK_S * (1e3 if unit == "ms" else 1), 0.5 * (time[at] - time[0]))):
             told.append(f"{where}: the time falls from {before:.15g} to {after:.15g} {unit}, as a clock does that is set back by "
                         f"{back + usual:.6g} {unit}; later times are taken so much later.")
             time[at + 1:] += back + usual
