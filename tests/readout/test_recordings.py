@@ -147,17 +147,17 @@ def test_what_the_format_cannot_hold_is_not_written(tmp_path, change, sentence):
 def test_the_extensions_readings_and_nodes_are_read(tmp_path):
     for kind, count in (("pred", 28), ("dz", 400)):
         lines = [["time_sec", "frame", *(f"{kind}_{k}" for k in range(count))]]
-        lines += [[f"{0.1 * t:.6f}", t, *(t + 0.25 * np.arange(count))] for t in range(3)]
+        lines += [[f"{7.5 + 0.1 * t:.6f}", t, *(t + 0.25 * np.arange(count))] for t in range(3)]
         one = read_recording(written(tmp_path / f"{kind}.csv", lines, separator=","))
-        assert one.time.values == pytest.approx([0, 0.1, 0.2])
+        assert one.time.values == pytest.approx([0, 0.1, 0.2]) and one.attrs["start_ms"] == 7500
         if kind == "pred":
             assert one.counts.shape == (3, 1, 7, 4) and one.counts[2, 0, 1, 1] == 2 + 0.25 * 5
         else:
             assert one.dz.shape == (3, 25, 16) and one.dz[1, 2, 3] == 1 + 0.25 * 35 and "counts" not in one
         with pytest.raises(InputError, match=f"has {count - 1} columns {kind}_"):
             read_recording(written(tmp_path / "short.csv", [line[:-1] for line in lines], separator=","))
-        lines[3][0] = "0.05"      # the extension appends a second run to the same file
-        with pytest.raises(InputError, match="row 4: time runs back from 0.1 to 0.05 s"):
+        lines[3][0] = "7.55"      # the extension appends a second run to the same file
+        with pytest.raises(InputError, match="row 4: time runs back from 7.6 to 7.55 s"):
             read_recording(written(tmp_path / "twice.csv", lines, separator=","))
 
 

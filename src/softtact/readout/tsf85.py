@@ -257,7 +257,8 @@ def _of_extension(path: Path, table: Table) -> "xarray.Dataset":
     values = np.array(table.numbers([f"{kind}_{k}" for k in range(count)])).T
     source = "extension of the paper's authors, a network's reading"
     counts = values.reshape(-1, 1, ROWS, COLUMNS) if kind == "pred" else np.zeros((len(time), 1, ROWS, COLUMNS), dtype=int)
-    recording = make_recording(time, counts, row_of_file=rows, source=source, file=str(path), repairs=repairs)
+    recording = make_recording(time - time[0], counts, row_of_file=rows, start_ms=round(1e3 * time[0]), source=source,
+                               file=str(path), repairs=repairs)
     if kind == "pred":
         return recording
     nodes = (("time", "node_y", "node_x"), values.reshape(-1, *_NODES), {"units": "as the extension writes it"})
