@@ -203,6 +203,7 @@ def test_unusable_settings_are_refused_by_name():
     for values, said in [
         ({"nose_counts": 1}, "key 'nose_counts' is unknown; use one of electrode_spacing_mm"),
         ({"drift": -0.1}, "drift is -0.1; give one number of 0 or more"),
+        ({"cycles_before": 1.7}, "cycles_before is 1.7; give a whole number"),
         ({"rate_n_per_s": 0}, "rate_n_per_s and largest_counts must be above 0"),
         ({"coupling": 0.3}, "coupling is 0.3; with four neighbours it is 0.25 at most"),
         ({"sheet_scatter": 0.4}, "sheet_scatter is 0.4; from 0.4 on a sheet could vanish"),

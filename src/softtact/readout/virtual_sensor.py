@@ -107,6 +107,8 @@ class VirtualSensorSettings:
                 continue
             if not (np.isscalar(value) and value >= 0 and (np.isfinite(value) or name in _MAY_BE_INFINITE)):
                 raise InputError(f"virtual_sensor: {name} is {value}; give one number of 0 or more.")
+        if self.cycles_before != int(self.cycles_before):
+            raise InputError(f"virtual_sensor: cycles_before is {self.cycles_before:g}; give a whole number.")
         if not (self.rate_n_per_s > 0 and (self.largest_counts is None or self.largest_counts > 0)):
             raise InputError("virtual_sensor: rate_n_per_s and largest_counts must be above 0; .inf switches their effect off.")
         if self.coupling > 0.25:
