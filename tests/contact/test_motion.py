@@ -60,6 +60,11 @@ def test_steps_that_are_no_motion_are_refused_in_one_sentence():
         (lambda: Motion.parse("z -1 over 0"), "a duration of 0 s is not possible"),
         (lambda: Motion.parse("hold -2"), "a duration of -2 s is not possible"),
         (lambda: Motion.parse("hold"), "the step 'hold' is not understood"),
+        (lambda: Motion.parse("z -0.1, z -0.2"), "the step 'z -0.1, z -0.2' names 'z' twice; keep one, or put a semicolon"),
+        (lambda: Motion.parse("z -1; fz -1 fz -2"), "names 'fz' twice"),
+        (lambda: Motion.parse("z -1; rz 1e400"), "rz=inf is no number; give a finite one"),
+        (lambda: Motion().step(loads={"z": float("nan")}), "z=nan is no number; give a finite one"),
+        (lambda: Motion().slide(x_mm=1.0, steps=2.5), "steps=2.5 is not possible; give a whole number from 1 on"),
         (lambda: Motion.parse("z -1 over 1; x 1").times_s, "step 2 of 2 has no duration and others have")]:
         with pytest.raises(InputError, match=sentence) as caught:
             make()

@@ -8,7 +8,7 @@ from softtact.play.files import Folder
 
 @pytest.mark.parametrize("name, kept", [("../../etc/part.stl", "part.stl"), ("C:\\x\\my part (2).STL", "my_part_2_.STL"),
                                         (".hidden.stl", "hidden.stl"), ("ä\x00b.obj", "b.obj"),
-                                        ("a" * 300 + ".ply", "a" * 76 + ".ply")])
+                                        ("a" * 300 + ".ply", "a" * 76 + ".ply"), ("x." + "y" * 75 + ".stl", "y" * 75 + ".stl")])
 def test_an_upload_is_kept_in_the_folder_under_a_safe_name(tmp_path, name, kept):
     path = Folder(tmp_path / "out").keep_upload(name, b"solid")
     assert path == tmp_path / "out/uploads" / kept and path.read_bytes() == b"solid"

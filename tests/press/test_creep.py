@@ -78,6 +78,8 @@ def test_presses_over_time_that_are_not_known_are_refused(tmp_path):
     sensor = softtact.load_sensor(relaxing_sheet(tmp_path))
     for motion, model, sentence in [
         ("fz -2 over 1; fz -1 over 1", "elastic", "the force falls at step 2 of 2"),
+        ("fz 0 over 1; fz -2 over 1", "elastic", "the load of step 1, fz 0 N, does not press; give one below 0"),
+        ("fz 5 over 1; fz -2 over 1", "elastic", "the load of step 1, fz 5 N, does not press; give one below 0"),
         ("z -0.1 over 1", "elastic", "sheet relaxes, which over time is known for presses straight down by force"),
         ("fz -2 over 1; rz 5 over 1", "solid", "sheet relaxes")]:
         with pytest.raises(InputError, match=sentence):

@@ -6,7 +6,8 @@ import trimesh
 import yaml
 
 import softtact
-from softtact.errors import InputError
+from softtact.errors import InputError, TimeLimitError
+from softtact.press.vtu import read_vtu
 from softtact.readout.registry import labelled, register
 from softtact.sensors.library import sensor_file
 
@@ -114,6 +115,45 @@ def test_steps_beyond_the_models_validity_are_flagged_with_their_reason(gel):
     assert wide.within_validity.tolist() == [0] and "touches the rim of the gel" in wide.validity_reason[0]
     fine = gel.press(CORNERS["needle"].copy().apply_transform(np.diag([1, -1, -1, 1])), motion="z -0.1", label="")
     assert fine.within_validity.tolist() == [0] and "fewer than 9 points" in fine.validity_reason[0]
+
+
+def test_steps_on_a_gel_are_given_as_they_are_completed_and_kept_where_a_press_is_stopped(gel, monkeypatch):
+    seen = []
+
+    def stop(result):
+        seen.append(result)
+        if result.steps == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        gel.press(BALL, motion="z -0.1 in 4", label="", on_step=stop)
+    assert [one.steps for one in seen] == [1, 2] and stopped.value.result.steps == 2
+    whole = gel.press(BALL, motion="z -0.1 in 4", label="")
+    monkeypatch.setattr("softtact.press.gel.Watch", Spent)
+    with pytest.raises(TimeLimitError) as late:
+        gel.press(BALL, motion="z -0.1 in 4", label="", time_limit_s=1.0)
+    assert late.value.result.steps == len(late.value.result.wall_time_s) == 3
+    assert late.value.result.force_n == pytest.approx(whole.force_n[:3])
+
+
+class Spent:
+    """A watch whose time is over at its third report."""
+
+    def __init__(self, label, *, limit_s):
+        self.reports = 0
+
+    def report(self, where):
+        self.reports += 1
+        if self.reports == 3:
+            raise TimeLimitError(where)
+
+
+def test_a_vtu_of_a_gel_that_is_let_go_keeps_the_order_of_its_steps(gel, tmp_path):
+    result = gel.press(BALL, motion="z -0.3; z 0.2", label="")
+    result.write_vtu(tmp_path / "gel.vtu")
+    read = read_vtu(tmp_path / "gel.vtu")
+    assert result.normal_force_n[0] > result.normal_force_n[1] and read.force_n == pytest.approx(result.normal_force_n, rel=1e-5)
+    assert -read.displacement_mm[:, :, 2].min(axis=1) == pytest.approx([0.3, 0.1], rel=0.2)
 
 
 @pytest.mark.parametrize(("how", "said"), [

@@ -8,6 +8,7 @@ import yaml
 
 import softtact
 from softtact.errors import InputError
+from softtact.materials.laws.registry import make_law
 from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, capacitance_per_area
 from softtact.readout.virtual_sensor import make_specimen
 from softtact.sensors.library import sensor_file
@@ -56,12 +57,26 @@ def test_a_file_without_a_kind_is_of_frusta():
     ({"layers": [{"material": "silicone", "thickness_mm": -1.0}]}, "field 'layers.0.thickness_mm' is not usable"),
     ({"layers": [{"material": "silicone", "thicknes_mm": 1.0}]}, "there is no key 'thicknes_mm'; did you mean 'thickness_mm'?"),
     ({"friction": {"board": 0.3}}, "there is no key 'board'"),
+    ({"readouts": {"left/right": {"kind": "capacitance"}}}, "at 'readouts': a file of results cannot hold the name 'left/right'"),
 ])
 def test_a_wrong_file_is_refused_by_file_and_field(changes, said, tmp_path):
     path = written(tmp_path, values_of(**changes))
     with pytest.raises(InputError) as refused:
         softtact.load_sensor(path)
     assert str(path) in str(refused.value) and said in str(refused.value)
+
+
+def test_the_linear_layer_follows_the_law_that_is_given_for_the_only_layer(tmp_path):
+    """Ten times as stiff: a modulus ten times as large, where the file leaves it to the law."""
+    values = values_of("sheet")
+    del values["elastic_layer"]
+    path = written(tmp_path, values)
+    soft, stiff = (softtact.load_sensor(path, materials={"dielectric": make_law("neo_hooke", {"c10": c10}, bulk_over_shear=20)})
+                   for c10 in (0.2, 2.0))
+    assert stiff.spec.elastic_layer.young_mpa == pytest.approx(10 * soft.spec.elastic_layer.young_mpa)
+    assert soft.spec.elastic_layer.young_mpa == pytest.approx(9 * 20 * 0.4 / (3 * 20 + 1))     # 9 K G / (3 K + G), G = 2 c10
+    stated = softtact.load_sensor("sheet", materials={"dielectric": make_law("neo_hooke", {"c10": 2.0}, bulk_over_shear=20)})
+    assert stated.spec.elastic_layer == softtact.load_sensor("sheet").spec.elastic_layer
 
 
 def test_where_frusta_are_needed_a_sensor_without_is_refused():

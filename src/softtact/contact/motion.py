@@ -86,8 +86,9 @@ class Motion:
         return self._in_steps("hold", {}, steps, seconds)
 
     def _in_steps(self, name: str, ways: dict[str, float], steps: int, over_s: float | None) -> "Motion":
-        if steps < 1:
-            raise InputError(f"Motion.{name}: steps={steps} is not possible; give 1 or more.")
+        if steps < 1 or steps != int(steps):
+            raise InputError(f"Motion.{name}: steps={steps} is not possible; give a whole number from 1 on.")
+        steps = int(steps)
         one = MotionStep({freedom: way / steps for freedom, way in ways.items() if way}, seconds=_share(name, over_s, steps))
         return Motion(self.steps + steps * (one,))
 
@@ -100,6 +101,8 @@ class Motion:
         for name in (*step.ways, *step.loads):
             if name not in FREEDOMS:
                 raise InputError(f"Motion: the freedom {name!r} is unknown; use one of {', '.join(FREEDOMS)}.")
+        for name, value in (*step.ways.items(), *step.loads.items()):
+            _finite(name, value)
         if both := set(step.ways) & set(step.loads):
             raise InputError(f"Motion: the freedom {both.pop()!r} is prescribed and loaded in one step; choose one.")
         return Motion((*self.steps, step))
@@ -201,6 +204,9 @@ class Motion:
         if unknown := [name for name, _ in terms if name not in FREEDOMS + LOADS]:
             raise InputError(f"motion: {unknown[0]!r} in the step {part!r} is no freedom; use one of "
                              f"{', '.join(FREEDOMS)} for a displacement, {', '.join(LOADS)} for a load.")
+        names = [name for name, _ in terms]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise InputError(f"motion: the step {part!r} names {twice[0]!r} twice; keep one, or put a semicolon between steps.")
         loads = {FREEDOMS[LOADS.index(name)]: value for name, value in terms if name in LOADS}
         ways, motion = {name: value / count for name, value in terms if name in FREEDOMS}, self
         each = _share("step", over_s, count)

@@ -52,7 +52,7 @@ class Folder:
 
     def keep_upload(self, name: str, content: bytes) -> Path:
         """Keep an uploaded file under a safe name; the same file is kept once. Raises InputError for one over the limit."""
-        safe = _UNSAFE.sub("_", PurePosixPath(name.replace("\\", "/")).name).lstrip("._")[-_LONGEST:]
+        safe = _UNSAFE.sub("_", PurePosixPath(name.replace("\\", "/")).name)[-_LONGEST:].lstrip("._")
         if not safe or not Path(safe).suffix:
             raise InputError(f"{name!r}: the name has no ending such as .stl or .csv; give a file of a mesh or a recording.")
         check_limit(safe, "mesh", len(content))

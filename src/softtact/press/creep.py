@@ -56,10 +56,13 @@ def slow_press(motion: Motion, creep: "tuple[np.ndarray, np.ndarray] | None") ->
     """The slow press by rising forces that stands for a timed one, its load step's number at each step (k,), and F_eff (k,).
 
     creep: c_j and T_j;  None: nothing creeps
-    Raises InputError where the force falls.
+    Raises InputError where the force falls, and for a load that does not press.
     """
     force, times = motion.held_forces_n, motion.times_s
     assert force is not None and times is not None
+    if (idle := np.flatnonzero(force <= 0)).size:
+        raise InputError(f"motion: the load of step {idle[0] + 1}, fz {-force[idle[0]]:g} N, does not press; give one below 0, or "
+                         "leave that step out.")
     if (falls := np.flatnonzero(np.diff(force) < 0)).size:
         raise InputError(f"motion: the force falls at step {falls[0] + 2} of {len(force)}, and a press of layers over time is "
                          "known while its load grows or is held; leave that step out, or press a sensor of kind solid.")

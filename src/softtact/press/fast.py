@@ -272,8 +272,8 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cont
     try:
         moved = move_elastic(sensor, placed, motion, seconds, label=control.label, threads=control.threads,
                              limit_s=control.time_limit_s)
-    except ConvergenceError as error:
-        if isinstance(before := error.result, ElasticMotion):
+    except (ConvergenceError, KeyboardInterrupt) as error:
+        if isinstance(before := getattr(error, "result", None), ElasticMotion):
             control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds, placed, motion))
         raise
     found = _of_motion(sensor, moved, seconds, placed, motion)

@@ -3,8 +3,7 @@
 Forces alone are a motion, too: every result has displacement, traction and slip.
 """
 
-import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
-from softtact.errors import ConvergenceError, InputError
+from softtact.errors import InputError
 from softtact.imaging.depth_image import MovedObject
 from softtact.models.elastic.wide_layer import WideLayer
 from softtact.models.elastic.wide_motion import follow_motion
@@ -53,24 +52,24 @@ def press_gel(sensor: "Sensor", placed: Trimesh, given: np.ndarray | Motion, con
     about = tuple(placed.bounds.mean(axis=0)[:2].tolist())
     mover = WideObject(layer, surface, (spec.map_x_mm, spec.map_y_mm), first_touch_mm=touch, friction=spec.friction.object,
                        about_mm=about)
-    watch, start = Watch(control.label, limit_s=control.time_limit_s), time.perf_counter()
-    seconds: list[float] = []
+    watch, steps, reached = Watch(control.label, limit_s=control.time_limit_s), list[WideStep](), control.reached
+
+    def so_far() -> PressResult:
+        return result_of(steps[:len(reached.times)])
 
     def result_of(steps: Sequence[WideStep]) -> PressResult:
         position = np.stack([step.position for step in steps])
         moved = MovedObject(placed, touch, position[:, :2], position[:, 2], np.array([step.turned_deg for step in steps]), about)
-        return gel_result(sensor, steps, seconds, moved)
+        return gel_result(sensor, steps, reached.times, moved)
 
-    def note(step: WideStep) -> None:
-        watch.report(f"step {len(seconds) + 1} of {len(motion.steps)}, {step.position[2]:.3f} mm deep")
-        seconds.append(time.perf_counter() - start - sum(seconds))
+    def followed() -> Iterator[None]:
+        for step in follow_motion(mover, motion, deepest_mm=spec.thickness_mm):
+            steps.append(step)
+            yield
+            if len(steps) < len(motion.steps):     # the step is kept, and more are to come
+                watch.report(f"step {len(steps)} of {len(motion.steps)}, {step.position[2]:.3f} mm deep")
 
-    try:
-        steps = follow_motion(mover, motion, deepest_mm=spec.thickness_mm, on_step=note)
-    except ConvergenceError as error:
-        if isinstance(before := error.result, list):
-            control.reached.keep(seconds, lambda: result_of(before))
-        raise
+    reached.follow(followed(), len(motion.steps), so_far)
     if not any(step.normal.any() for step in steps):
         raise InputError(f"The object never touches {spec.name} in this motion, which begins at first touch; move it down, for "
                          'example by "z -0.5".')

@@ -18,6 +18,7 @@ from softtact.geometry.meshes import check_over_sensor, default_pose, place
 from softtact.linalg.workers import on_one_thread
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
+from softtact.materials.linear import LinearConstants
 from softtact.press import choice
 from softtact.press.creep import at_times, refuse_creep, slow_press
 from softtact.press.fast import press_elastic_motion
@@ -28,6 +29,7 @@ from softtact.press.task import PressTask, checked_forces
 from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.readout import points, taxels  # registered as they are imported  # noqa: F401
 from softtact.readout.registry import PlaneMotion, SurfaceMotion, register_later
+from softtact.sensors.layers import LayersSpec
 from softtact.sensors.library import material_file
 from softtact.sensors.specification import AnySpec, SensorSpec
 
@@ -71,6 +73,8 @@ def load_layers(spec: AnySpec, laws: dict[str, Law]) -> dict[str, Any]:
     for layer in sorted(set(laws) - set(spec.materials)):
         raise InputError(f"{spec.name} has no layer {layer!r} for the material given; its layers are {', '.join(spec.materials)}.")
     stiffness = 1.0
+    if "dielectric" in laws and isinstance(spec, LayersSpec) and spec.elastic_layer_follows_law:
+        spec = spec.with_elastic_layer_of(LinearConstants.of_law(laws["dielectric"]))
     if spec.calibration is not None:
         stiffness = spec.calibration.modulus_scale
         layer_of_all = spec.elastic_layer.model_copy(update={"young_mpa": stiffness * spec.elastic_layer.young_mpa})

@@ -92,9 +92,10 @@ class PressedMesh:
             mesh.write(temporary, file_format="vtu")
 
     def _ends(self) -> list[str]:
-        """Ends of the arrays' names: the force, and the step's number where forces repeat, as in a motion."""
+        """Ends of the arrays' names: the force, and the step's number where forces repeat or fall, as in a motion."""
         ends = [f"{force:g}N" for force in self.force_n]
-        return ends if len(set(ends)) == len(ends) else [f"{end}_step{number}" for number, end in enumerate(ends, start=1)]
+        rising = len(set(ends)) == len(ends) and (np.diff(self.force_n) > 0).all()
+        return ends if rising else [f"{end}_step{number}" for number, end in enumerate(ends, start=1)]
 
     def with_object(self, placed: PlacedObject) -> "PressedMesh":
         """The same with the object, as triangles of the layer `object` that move as one."""

@@ -137,7 +137,7 @@ def write_page(view: PressView, path: str | Path) -> None:
 
 
 def save_picture(view: PressView, path: str | Path) -> str:
-    """Draw the press at its largest force as PNG; return the renderer's name: pyvista if it is installed, else matplotlib."""
+    """Draw the press at its last load step as PNG; return the renderer's name: pyvista if it is installed, else matplotlib."""
     try:
         import pyvista
     except ImportError:

@@ -82,6 +82,9 @@ class Specification(FiniteSection):
         low, high = self.force_range_n
         if low < 0 or low >= high:
             raise InputError(f"{where}, at 'force_range_n': {[low, high]} is no range; write [least, largest] in N.")
+        for name in self.readouts:
+            if not name or "/" in name:
+                raise InputError(f"{where}, at 'readouts': a file of results cannot hold the name {name!r}; write it without '/'.")
 
     @model_serializer(mode="wrap")
     def _without_defaults(self, handler: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn, Self
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from softtact.errors import InputError
 from softtact.materials.config import law_from_printed
@@ -43,6 +43,7 @@ class LayersSpec(BaseSpec):
     elastic_layer: ElasticLayer = Field(None, description="by default of the law of a single layer")     # type: ignore[assignment]
     element_mm: Length | None = None
     friction: ObjectFriction = ObjectFriction()
+    _follows_law: bool = PrivateAttr(False)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Self:
@@ -54,7 +55,18 @@ class LayersSpec(BaseSpec):
             raise InputError(f"{where}, at 'elastic_layer': it is missing, and two layers have no single law from which it could "
                              "follow; give its young_mpa and poisson.")
         linear = LinearConstants.of_law(law_from_printed(material_file(spec.dielectric.material), "mooney_rivlin"))
-        return spec.model_copy(update={"elastic_layer": ElasticLayer(young_mpa=linear.young_mpa, poisson=linear.poisson)})
+        return spec.with_elastic_layer_of(linear)
+
+    def with_elastic_layer_of(self, linear: LinearConstants) -> Self:
+        """The sensor with the linear layer of its single layer's law."""
+        made = self.model_copy(update={"elastic_layer": ElasticLayer(young_mpa=linear.young_mpa, poisson=linear.poisson)})
+        made._follows_law = True
+        return made
+
+    @property
+    def elastic_layer_follows_law(self) -> bool:
+        """Whether the file leaves the linear layer to the law of a single layer."""
+        return self._follows_law
 
     @property
     def dielectric(self) -> PlainLayer:

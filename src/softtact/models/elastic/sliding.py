@@ -318,8 +318,8 @@ def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray
                 on_step(state)
             states.append(state)
             counts.append(count)
-    except ConvergenceError as error:
-        error.result = _result(mover, states, counts) if counts else None
+    except (ConvergenceError, KeyboardInterrupt) as error:
+        error.result = _result(mover, states, counts) if counts else None     # type: ignore[union-attr]
         raise
     return _result(mover, states, counts)
 
