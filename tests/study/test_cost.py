@@ -37,7 +37,8 @@ def test_the_paper_study_costs_710_presses_of_each_model_and_less_than_two_days(
     # 13,000 maps of which 10,400 train once, 2,600 validate twice; 400 cases twice; 40 presses x 20 load steps x 50 readings
     samples = 10_400 + 5_200 + 800 + 40_000
     assert costs["build_dataset"].disk_mb == pytest.approx(3 * samples * (57 * 33 + 28) * 4 / 1e6)
-    hours = {name: sum(cost.hours for stage, cost in costs.items() if name in stage) for name in ("", "search", "train_cnn", "learning_rate")}
+    hours = {name: sum(cost.hours for stage, cost in costs.items() if name in stage)
+             for name in ("", "search", "train_cnn", "learning_rate")}
     network = hours["search"] + hours["train_cnn"] + hours["learning_rate"]
     assert f"needs {hours['']:.0f} core hours, {network:.0f} of them" in Path("docs/performance.md").read_text(encoding="utf-8")
     lines = list(cost_lines(opened.name, costs.values(), origin=origin_of(opened, read_costs()), cores=2))
