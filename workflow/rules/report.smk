@@ -46,7 +46,7 @@ rule make_tables:
             if STUDY.archive
             else {
                 "features": rules.measure_features.output.features,
-                "pressed": [f"{RESULTS}/presses/grasps/{GRASPS[0].id}/{model}.nc" for model in STUDY.tested],
+                "pressed": [f"{RESULTS}/presses/grasps/{FIRST.id}/{model}.nc" for model in STUDY.tested],
                 "repeated": [f"{RESULTS}/repeated/{model}.nc" for model in STUDY.tested],
             }
         ),
