@@ -100,6 +100,11 @@ def test_what_a_skin_does_not_have_is_refused_in_a_sentence(skin, use, words):
         use(skin)
 
 
+def test_a_load_that_pulls_is_refused(skin):
+    with pytest.raises(InputError, match="small_skin: a load of fz 5 N does not press; give one below 0, or force_n"):
+        skin.press(BALL, motion="fz 5", label="")
+
+
 def test_a_result_is_read_back_as_it_was_written(pressed, tmp_path):
     pressed.write(tmp_path / "press.nc")
     kept = read_press(tmp_path / "press.nc")

@@ -62,6 +62,8 @@ def press_skin(sensor: "Sensor", task: PressTask, *, model: str) -> PressResult:
         what = "a soft object" if task.soft else "this motion"
         raise InputError(f"{sensor.spec.name}, a sensor of kind skin: it is pressed by a rigid object straight down by forces, not "
                          f"by {what}; give a rigid mesh and force_n.")
+    if lifts := [force for force in task.motion.forces_n if force <= 0]:
+        raise InputError(f"{sensor.spec.name}: a load of fz {-lifts[0]:g} N does not press; give one below 0, or force_n.")
     placed = over_skin(sensor.prepared_models["elastic"], task.pressed, task.pose, sensor.spec.name)     # type: ignore[arg-type]
     forces, reached = np.array(task.motion.forces_n), task.control.reached
     found: list[tuple[Load, Readings]] = []
