@@ -214,7 +214,7 @@ def test_a_slide_takes_one_thread_of_blas(sensor, monkeypatch):
     def begin(*_, **__):
         raise Begun(blas_threads())
 
-    monkeypatch.setattr(fast, "move_elastic", begin)
+    monkeypatch.setattr(fast, "_moved_elastic", begin)
     with threads_of_blas(2), pytest.raises(Begun) as begun:
         sensor.press(ellipsoid(), pose=POSE, motion="fz -1; x 0.1 in 1", model="elastic", label="")
     assert begun.value.args == ({1},)

@@ -171,10 +171,20 @@ def test_what_was_reached_before_an_interruption_is_kept_by_each_model(sensors, 
 
 
 @pytest.mark.slow
-def test_what_was_reached_before_a_motion_fails_is_kept_by_the_elastic_model(sensors):
+def test_what_was_reached_before_a_motion_fails_or_is_interrupted_is_kept_by_the_elastic_model(sensors):
     with pytest.raises(ConvergenceError) as stopped:
         sensors["frusta"].press(BALL, motion=Motion().press(depth_mm=[0.02, 2.0]), model="elastic", label="")
     assert stopped.value.result.indentation_mm == pytest.approx([0.02]) and stopped.value.result.readings
+    seen = []
+
+    def stop(result):
+        seen.append(result.indentation_mm.tolist())
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as ended:
+        sensors["frusta"].press(BALL, motion=Motion().press(depth_mm=[0.01, 0.02, 0.03]), model="elastic", label="", on_step=stop)
+    assert [len(depths) for depths in seen] == [1, 2] and ended.value.result.indentation_mm == pytest.approx([0.01, 0.02])
 
 
 def test_the_names_of_version_0_1_are_short_names_of_the_same(sensors):

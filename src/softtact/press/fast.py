@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
 from softtact.linalg.workers import on_one_thread
 from softtact.models.elastic.compliance import LayerPress, press_object
-from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
+from softtact.models.elastic.sliding import SlidingObject, SlidingState, check_motion, motion_of, steps_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.cache import cached_surface_compliance
 from softtact.press.making import make_result, warn_of_shell
@@ -268,15 +269,7 @@ def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, cont
     if not sensor.spec.base_held:
         raise InputError(f"{sensor.spec.name} has support 'none', which the elastic model presses straight down by force only; use "
                          "the hyperelastic model for this motion.")
-    seconds: list[float] = []
-    try:
-        moved = move_elastic(sensor, placed, motion, seconds, label=control.label, threads=control.threads,
-                             limit_s=control.time_limit_s)
-    except (ConvergenceError, KeyboardInterrupt) as error:
-        if isinstance(before := getattr(error, "result", None), ElasticMotion):
-            control.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds, placed, motion))
-        raise
-    found = _of_motion(sensor, moved, seconds, placed, motion)
+    found = _moved_elastic(sensor, placed, motion, control)
     if not _between_nodes(sensor, HeightField.of(placed)):
         return found
     warnings.warn("The object has walls or pins that fall between the points of the elastic model's surface in some places of the "
@@ -292,28 +285,35 @@ def _between_nodes(sensor, surface):
     return any(Underside(surface.moved(way), grid).narrow_parts(sensor.spec.thickness_mm) for way in beside)
 
 
-def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
-                 threads: int = 1, limit_s: float | None = None) -> ElasticMotion:
-    """The `ElasticMotion` of a mesh placed in the sensor's frame; the time of each step is appended to `seconds`.
+def _moved_elastic(sensor, placed, motion, control):
+    """The result of a mesh placed in the sensor's frame along a motion.
 
-    Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
-    its `result`, for a step that is not reached.
+    Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError for a step that is not
+    reached.
     """
-    check_motion(motion)
+    check_motion(motion)     # before what takes long to prepare
     if "elastic_surface" not in sensor.prepared_models:
-        sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
-    compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
-    shell, surface, start = shell_of(sensor), HeightField.of(placed), time.perf_counter()
-    watch = Watch(label, limit_s=limit_s)
-
-    def note(state: SlidingState) -> None:
-        shell.refuse_motion(surface, state.position[:2], state.position[2] + lowest, lowest, step=len(seconds) + 1)
-        watch.report(f"step {len(seconds) + 1} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
-        seconds.append(time.perf_counter() - start - sum(seconds))
-
+        sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=control.threads)
+    spec, surface, shell = sensor.spec, HeightField.of(placed), shell_of(sensor)
     lowest = surface.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
-    return move_on_layer(compliance, surface, motion, first_touch_mm=lowest, friction=spec.friction.object,
-                         deepest_mm=spec.thickness_mm, on_step=note)
+    mover = SlidingObject(sensor.prepared_models["elastic_surface"], surface, first_touch_mm=lowest,
+                          friction=spec.friction.object, deepest_mm=spec.thickness_mm)
+    watch, reached = Watch(control.label, limit_s=control.time_limit_s), control.reached
+    steps: list[tuple[SlidingState, int]] = []
+
+    def followed() -> Iterator[None]:
+        for state, count in steps_on_layer(mover, motion):
+            shell.refuse_motion(surface, state.position[:2], state.position[2] + lowest, lowest, step=len(steps) + 1)
+            steps.append((state, count))
+            yield
+            if len(steps) < len(motion.steps):     # the step is kept, and more are to come
+                watch.report(f"step {len(steps)} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
+
+    def so_far() -> PressResult:
+        return _of_motion(sensor, motion_of(mover, steps[:len(reached.times)]), reached.times, placed, motion)
+
+    reached.follow(followed(), len(motion.steps), so_far)
+    return so_far()
 
 
 def _of_motion(sensor, moved, seconds, placed, motion):

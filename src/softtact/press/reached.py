@@ -45,10 +45,6 @@ class Reached:
                     warnings.simplefilter("ignore")
                     self.on_step(self.finish(so_far()))
 
-    def keep(self, times: list[float], so_far: "Callable[[], PressResult]") -> None:
-        """Record the times of steps that a model iterated over itself."""
-        self.times, self._so_far = times, so_far
-
     def result(self) -> "PressResult | None":
         """The result of the completed steps; None without any."""
         return self.finish(self._so_far()) if self._so_far is not None and self.times else None

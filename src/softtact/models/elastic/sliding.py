@@ -11,7 +11,7 @@ half of the nodes' spacing (so that the object skips no node, and each node stic
 of at most an eighth of it. Without friction there is no history, and each step is one increment.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,7 +85,7 @@ class SlidingObject:
     def __init__(self, compliance: SurfaceCompliance, underside: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
                  *, first_touch_mm: float, friction: float, deepest_mm: float, settings: CoulombSettings = _SETTINGS) -> None:
         self.compliance, self.friction, self.settings = compliance, friction, settings
-        self._underside, self._first_touch, self._deepest = underside, first_touch_mm, deepest_mm
+        self._underside, self._first_touch, self.deepest_mm = underside, first_touch_mm, deepest_mm
         self._operators = (b"", None)
 
     @property
@@ -117,18 +117,18 @@ class SlidingObject:
     def _solve(self, state, place, allowed, way, depth, load, *, expected):
         """The contact for given places, with as many candidate nodes as its depth asks for; expected: its depth in mm."""
         heights = self.heights(place)
-        if (heights[allowed] < self._deepest).any():
+        if (heights[allowed] < self.deepest_mm).any():
             heights = np.where(allowed, heights, NO_CONTACT_MM)
         reach = REACH * max(self._expected_depth(heights, load) if depth is None else depth, state.position[2]) + LEAST_REACH_MM
         while True:
-            nodes = np.flatnonzero(heights < min(reach, self._deepest))
+            nodes = np.flatnonzero(heights < min(reach, self.deepest_mm))
             if not len(nodes):
                 return self._free(state, depth)
             among, spread = self._operators_of(nodes)
             carried = state.moved[nodes] + self._share_in_contact(state, among, nodes, heights, place, expected)[:, None] * way
             contact = solve_increment(among, Increment(heights[nodes], carried, self.friction, depth, load),
                                       normal=state.normal[nodes], tangential=state.tangential[nodes], settings=self.settings)
-            if reach >= self._deepest or RISE * contact.depth <= reach:
+            if reach >= self.deepest_mm or RISE * contact.depth <= reach:
                 return _Found(nodes, contact, heights[nodes], *spread(contact), contact.depth)
             reach *= REACH
 
@@ -151,7 +151,7 @@ class SlidingObject:
 
     def _expected_depth(self, heights, load):
         """Depth in mm of a load on springs side by side."""
-        there = heights[heights < self._deepest]
+        there = heights[heights < self.deepest_mm]
         if not len(there):
             raise InputError("The object has slid off the sensor's free surface and carries no load any more; move it less far.")
         lowest, area = there.min(), np.full(len(there), np.prod(self.compliance.grid.step))
@@ -206,7 +206,7 @@ class SlidingObject:
         if len(touching):
             stayed, sliding = state.normal[touching] > 0, ~contact.sticks[found.acting]
             along = found.dragged[touching] - state.dragged[touching] - way
-            out = ~stayed & (self.heights(place[touching]) >= self._deepest)
+            out = ~stayed & (self.heights(place[touching]) >= self.deepest_mm)
             place[touching[stayed]] = (state.place[touching] + np.where(sliding[:, None], along, 0.0))[stayed]
             place[touching[out]] = used[touching[out]]
         return place
@@ -295,33 +295,41 @@ class ElasticMotion:
 
 def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
                   motion: Motion, *, first_touch_mm: float, friction: float, deepest_mm: float,
-                  settings: CoulombSettings = _SETTINGS, on_step: Callable[[SlidingState], None] | None = None) -> ElasticMotion:
+                  settings: CoulombSettings = _SETTINGS) -> ElasticMotion:
     """The `ElasticMotion` of an object with an `underside(x, y)` (heights (n,) in mm and normals) over a layer.
 
     first_touch_mm: height of its lowest point over the surface;  friction: Coulomb's coefficient
-    deepest_mm: the layer's thickness;  on_step: called with each step's `SlidingState`, which it may refuse
+    deepest_mm: the layer's thickness
     Raises InputError for freedoms that the model does not know, and ConvergenceError with `result`, the `ElasticMotion` of the
     steps before (or None), where a step is not reached.
     """
-    check_motion(motion)
     mover = SlidingObject(compliance, underside, first_touch_mm=first_touch_mm, friction=friction, deepest_mm=deepest_mm,
                           settings=settings)
-    states, counts, load = [mover.start], [], None
+    steps: list[tuple[SlidingState, int]] = []
     try:
-        for number, step in enumerate(motion.steps, start=1):
-            load = load_after(step, load)
-            state, count = _follow_step(mover, states[-1], step, load)
-            if state.position[2] > deepest_mm:
-                raise ConvergenceError(f"Step {number} was not reached: the object would be {state.position[2]:.3g} mm deep in a "
-                                       f"layer {deepest_mm:g} mm thick; press less deep or with less force.")
-            if on_step:
-                on_step(state)
-            states.append(state)
-            counts.append(count)
-    except (ConvergenceError, KeyboardInterrupt) as error:
-        error.result = _result(mover, states, counts) if counts else None     # type: ignore[union-attr]
+        steps.extend(steps_on_layer(mover, motion))
+    except ConvergenceError as error:
+        error.result = motion_of(mover, steps) if steps else None
         raise
-    return _result(mover, states, counts)
+    return motion_of(mover, steps)
+
+
+def steps_on_layer(mover: SlidingObject, motion: Motion) -> Iterator[tuple[SlidingState, int]]:
+    """The state at each step's end and the number of its increments. Raises as `move_on_layer`, without a `result`."""
+    check_motion(motion)
+    state, load = mover.start, None
+    for number, step in enumerate(motion.steps, start=1):
+        load = load_after(step, load)
+        state, count = _follow_step(mover, state, step, load)
+        if state.position[2] > mover.deepest_mm:
+            raise ConvergenceError(f"Step {number} was not reached: the object would be {state.position[2]:.3g} mm deep in a "
+                                   f"layer {mover.deepest_mm:g} mm thick; press less deep or with less force.")
+        yield state, count
+
+
+def motion_of(mover: SlidingObject, steps: Sequence[tuple[SlidingState, int]]) -> ElasticMotion:
+    """The `ElasticMotion` of steps of `steps_on_layer` from the first on."""
+    return _result(mover, [mover.start, *(state for state, _ in steps)], [count for _, count in steps])
 
 
 def check_motion(motion: Motion, *, prescribed: Sequence[str] = ("x", "y", "z"), refused: str = _REFUSED) -> None:
