@@ -56,7 +56,8 @@ def test_calibrate_writes_a_sensor_that_presses_and_a_page_with_its_residuals(fo
     (BOTH.replace("--fit none", "--fit cover"), "The elastic model is one layer and knows no cover"),
     (BOTH.replace("--force plate_force.csv --force bar_force.csv", "--force 2000"), "--force 2000: its largest force is 2000 N"),
     (BOTH.replace("--force plate_force.csv", "--force late.csv"), "late.csv: the counts of finger 0 follow its forces best when"),
-    (BOTH + " --place 1,2", "--place 1,2: it is not three numbers"),
+    (BOTH + " --place 1,2", "--place 1,2: it is not three finite numbers"),
+    (BOTH + " --place nan,0,0", "--place nan,0,0: it is not three finite numbers"),
     (BOTH + " --finger 1", "plate.csv: finger 1 changes by"),
     (BOTH, "bar.csv: the press explains"),     # the bar did not lie in the middle
     (BOTH.replace("mine.yaml", "small.yaml"), "--out small.yaml: it is the input"),
