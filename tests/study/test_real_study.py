@@ -1,8 +1,8 @@
 """The study on measured data: its jobs, its stages on data of its own, verdicts, and sentences for data that are not there."""
 
 import json
-from pathlib import Path
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
