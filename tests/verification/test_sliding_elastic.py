@@ -14,7 +14,7 @@ from thick_layer import thick_layer
 
 from softtact.contact.coulomb import CoulombSettings
 from softtact.contact.motion import Motion
-from softtact.models.elastic.sliding import SlidingObject, move_on_layer
+from softtact.models.elastic.sliding import SlidingObject, steps_on_layer
 from softtact.models.elastic.tangential import surface_compliance
 
 pytestmark = pytest.mark.slow     # the compliance of two thick layers
@@ -134,9 +134,9 @@ def test_a_wide_bonded_layer_that_sticks_is_in_simple_shear(record):
     coro = CORO
     wide = coro.model_copy(update={"footprint_mm": (40.0, 40.0), "map_shape": (13, 13), "cover": coro.cover.model_copy(
         update={"thickness_mm": thickness - coro.dielectric_thickness_mm})})
-    surface, states = surface_compliance(wide), []
-    move_on_layer(surface, flat_punch(100.0), Motion().press(depth_mm=delta).slide(x_mm=delta), first_touch_mm=0.0, friction=10.0,
-                  deepest_mm=thickness, on_step=states.append)
+    surface = surface_compliance(wide)
+    mover = SlidingObject(surface, flat_punch(100.0), first_touch_mm=0.0, friction=10.0, deepest_mm=thickness)
+    states = [state for state, _ in steps_on_layer(mover, Motion().press(depth_mm=delta).slide(x_mm=delta))]
     shear = layer["young_mpa"] / (2 * (1 + layer["poisson"]))
     half = surface.grid.shape[0] // 2
     middle = slice(half, half + 2)                      # a corner, two mid-sides and a centre: an element's worth
