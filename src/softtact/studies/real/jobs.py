@@ -130,11 +130,11 @@ class _Jobs:
         names = ["gel_force", "markers", "other_markers", "shading", "ball_size", "circles"]
         tables = {name: self.table(name) for name in names}
         limits = {name: one.least_mae for name, one in self.values.shading.sets.items()}
-        made = {name: one.source == "made" for name, one in self.values.shading.sets.items()}
+        made = {name: one.source == MADE for name, one in self.values.shading.sets.items()}
         stated = {name: one.ball_px if one.stated else None for name, one in self.values.shading.sets.items()}
         judge = Job("judge", tables, {"claims": self.table("claims")},
                     {"limits": limits, "made": made, "stated": stated,
-                     "markers_made": self.markers.image == "made", "sheared": self.markers.sheared,
+                     "markers_made": self.markers.image == MADE, "sheared": self.markers.sheared,
                      "judged": self.values.gel_force.judged})
         figures = [f"{self.folder}/figures/{name}.png" for name in FIGURES]
         facts = [f"{self.folder}/presses/{name}.json" for name in self.sets]

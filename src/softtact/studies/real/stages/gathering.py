@@ -17,10 +17,10 @@ from softtact.imaging.marker_motion import COLUMNS, MarkerMotion
 from softtact.imaging.shading import PhongShading
 from softtact.outputs import cache_folder, temporary_folder
 from softtact.processes import run_tied
-from softtact.studies.real.config import gel_data
+from softtact.studies.real.config import MADE, gel_data
 
 WHEEL = "taxim==1.4.1"
-_MADE = (96, 72)        # columns and rows of images that the study draws
+_DRAWN_PX = (96, 72)        # columns and rows of images that the study draws
 _TABLE = ("grad_r", "grad_g", "grad_b")
 
 
@@ -41,7 +41,7 @@ def gather_presses(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
 
 def gather_markers(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Gather the motion of markers.  outputs: markers (CSV);  settings: file (or made), data, seed, markers: what made ones show"""
-    if settings["file"] == "made":
+    if settings["file"] == MADE:
         write_csv(outputs["markers"], _drawn_markers(settings["markers"], settings["seed"]))
         return
     path = Path(settings["file"])
@@ -96,8 +96,8 @@ def _of_fots(folder):
 
 def _drawn(one, seed):
     """Presses that the study draws with three lights of its own; they test the stages and show nothing about a gel."""
-    rng, (columns, rows) = np.random.default_rng(seed), _MADE
-    true = PhongShading(_MADE, np.zeros((1, 3)), azimuth_rad=np.array([0.1, 2.2, 4.3]), elevation_rad=np.array([0.5, 0.6, 0.4]),
+    rng, (columns, rows) = np.random.default_rng(seed), _DRAWN_PX
+    true = PhongShading(_DRAWN_PX, np.zeros((1, 3)), azimuth_rad=np.array([0.1, 2.2, 4.3]), elevation_rad=np.array([0.5, 0.6, 0.4]),
                         diffuse=np.array([90.0, 70, 80]), specular=np.array([10.0, 10, 5]), exponent=np.array([4.0, 6, 8]))
     y, x = np.mgrid[:rows, :columns]
     background = np.rint(110 + 0.3 * x[..., None] + np.array([0.2, 0, -0.2]) * y[..., None])
