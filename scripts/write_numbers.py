@@ -361,6 +361,13 @@ def poses() -> str:
             f"at most {read['budget']} presses.\n\n{table(head, rows)}")
 
 
+def pose_gradients() -> str:
+    """Errors and times of the foundation model's derivatives by the pose."""
+    rows = [[row["object"], *(f"{row[by]:.2f} ({row[f'{by}_steps_apart']:.2f})" for by in ("x", "y", "rx", "ry")),
+             row["press_s"], row["gradient_s"]] for row in record("pose_gradients")["rows"]]
+    return f"{source('pose_gradients')}\n\n{table('object, x, y, rx, ry, press (s), gradient (s)', rows)}"
+
+
 def calibration_places() -> str:
     """What differences of presses and gradients cost, and how well they tell the map at a place beside."""
     rows = [[row["model"], row["object"], *(f"{row[column]:.2g}" if row[column] is not None else ""
@@ -385,7 +392,7 @@ def pages() -> dict[Path, str]:
                      "other sensors": other_sensors()},
               DECIDE: {"anchors": anchors()}, CALIBRATE: {"calibration places": calibration_places()},
               SOLID: {"races": solid_races(), "kernels": solid_kernels()},
-              VIRTUAL: {"electrode field": electrode_field()}, POSE: {"poses": poses()},
+              VIRTUAL: {"electrode field": electrode_field()}, POSE: {"poses": poses(), "pose gradients": pose_gradients()},
               LEARN: {"environment": environment(), "vector environment": vector_environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 

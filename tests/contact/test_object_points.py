@@ -136,6 +136,16 @@ def test_no_point_is_higher_than_asked_for():
     assert few.count < many.count and np.isin(few.nodes, many.nodes).all()
 
 
+@pytest.mark.parametrize("mesh", [ball(2.0), ball(9.0), placed(OBLONG, (0.11, 0.23, 0, 12, -9, 27)), punch(3.0)])
+def test_points_up_to_a_height_are_those_of_the_points_up_to_a_larger_one(mesh):
+    """Surroundings that lie higher are left out before they are looked at."""
+    few, all_of_them = object_points(mesh, 0.3), object_points(mesh, 2.5)
+    low = np.flatnonzero(all_of_them.gap < underside(mesh, GRID).lowest_mm + 0.3)
+    np.testing.assert_array_equal(few.nodes, all_of_them.nodes[low])
+    np.testing.assert_array_equal(few.gap, all_of_them.gap[low])
+    np.testing.assert_array_equal(few.nodes[few.edge], np.intersect1d(all_of_them.nodes[all_of_them.edge], few.nodes))
+
+
 def test_the_depth_on_springs_presses_them_with_the_whole_force():
     below = underside(placed(punch(2.0)), GRID)
     assert below.depth_on_springs(3.0, 0.5) == pytest.approx(3.0 / 0.5 / (4 * np.pi), rel=0.05)     # half a step's samples

@@ -69,6 +69,11 @@ class HeightField:
             other._search = (origin + way[:2], *same)
         return other
 
+    def carried(self, way: Callable[[np.ndarray], np.ndarray]) -> "HeightField":
+        """The height field after displacements way(corners (n, 3)) (n, 3) in mm of the object's corners."""
+        points, facets = self._surface
+        return HeightField(trimesh.Trimesh(points + way(points), facets, process=False))
+
     def over_lines(self, x_mm: np.ndarray, y_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (y, x) over points of rising lines x_mm (x,), y_mm (y,), and the triangles (y, x) there; -1 beside the object."""
         height, number = lowest_over_lines(self.triangles, np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float))

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, minimum_filter1d
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.lower_envelope import NO_CONTACT_MM, heights_of
@@ -100,7 +100,7 @@ class Underside:
 
     def _beside_edges(self, near, reach_mm):
         """Nodes near edges that the object may touch: numbers (e,), gaps, slopes and windows; and their `Beneath`."""
-        heights, triangles = self._windows(near)
+        near, (heights, triangles) = self._windows(near, self.lowest_mm + reach_mm)
         over_node = self._above(heights, np.zeros((len(near), 2)), self._height[near], self._slope[near])
         places, at = _lowest_samples(heights)
         number = triangles.reshape(-1, np.prod(triangles.shape[1:]))[np.arange(len(near)), at]
@@ -131,8 +131,10 @@ class Underside:
         window[(heights >= NO_CONTACT_MM) | (height >= NO_CONTACT_MM)[:, None, None]] = NO_CONTACT_MM
         return gap, slope, window.astype(np.float32)
 
-    def _windows(self, nodes):
-        """Heights (e, s, s) of the object at the samples around nodes, and the triangles (e, s, s) over these."""
+    def _windows(self, nodes, below_mm):
+        """The nodes over which a facet around may come below a height; heights (e, s, s) of the object at the samples around these,
+        and the triangles (e, s, s) over the samples.
+        """
         side, size = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5, len(window_places())
         lines, first = [], []
         for line, step, place in zip((self._grid.x, self._grid.y), self._grid.step, np.divmod(nodes, self._grid.shape[1])[::-1],
@@ -140,7 +142,13 @@ class Underside:
             low, high = (place.min(), place.max()) if len(place) else (0, 0)
             lines.append(line[0] + (np.arange(low - REACH, high + REACH + 1)[:, None] + side).ravel() * step)
             first.append(SAMPLES * (place - low) + SAMPLES // 2)
-        return [sliding_window_view(raster, (size, size))[first[1], first[0]] for raster in self._surface.over_lines(*lines)]
+        rasters = self._surface.over_lines(*lines)
+        lowest = rasters[0]
+        for axis in (0, 1):
+            lowest = minimum_filter1d(lowest, size, axis=axis, origin=-(size // 2))     # of the window that begins at each sample
+        x, y = first
+        low = lowest[y, x] - _SMOOTH * np.linalg.norm(self._grid.step) < below_mm     # plane over the node, from the lowest sample
+        return nodes[low], [sliding_window_view(raster, (size, size))[y[low], x[low]] for raster in rasters]
 
 
 def _sampled(surface, grid):

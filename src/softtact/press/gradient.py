@@ -27,6 +27,7 @@ from softtact.models.elastic.compliance import touch_object
 from softtact.models.elastic.gradient import LayerPressRates, PressedLayer
 from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places
+from softtact.models.foundation.edge_rates import EdgeRates, MovedPoints, moved_points
 from softtact.models.foundation.gradient import Balance, Tangent
 from softtact.models.foundation.solve import FoundationMaps, settled_contacts
 from softtact.press.cache import cached_compliance, cached_foundation
@@ -280,10 +281,17 @@ def _of_foundation(press, of, names):
     compliance, in_pose = sensor.prepared("foundation"), press.surface()
     surface = in_pose.near_touch(spec.map_x_mm, spec.map_y_mm)
     underside = Underside(surface, compliance.grid)
-    points = underside.points(_reach(press, underside, compliance))
+    reach_mm = _reach(press, underside, compliance)
+    points = underside.points(reach_mm)
     lift = [0.0, 0.0, in_pose.lowest_mm - surface.lowest_mm]
     others = [cached_foundation(other, sensor.laws) for other in _thinner_and_thicker(spec)] if "thickness" in names else []
-    near = _Near(press, surface, points, lambda places: press.velocities(places + lift), others)
+
+    def moving(places):
+        return press.velocities(places + lift)
+
+    numbers = [number for number, name in enumerate(_POSE) if name in names]
+    aside = moved_points(compliance, surface, points, reach_mm, moving, numbers)
+    near = _Near(press, surface, points, aside, moving, others)
     steps = list(settled_contacts(compliance, points, press.normal_force_n))
     balance = Balance(compliance, points, steps[0])
     found = [near.rates(balance.of(contact), names) for contact in steps]
@@ -311,6 +319,8 @@ class _Near:
     press: SettledPress
     surface: HeightField
     points: ObjectPoints
+    aside: Mapping[int, MovedPoints]
+    """By the numbers of the pose that are asked for."""
     moving: Callable[[np.ndarray], np.ndarray]
     others: list[FoundationCompliance]
 
@@ -318,8 +328,7 @@ class _Near:
         """`Rates` of a load step by each name."""
         contact, wanted = balance.contact, {*names} | ({"force"} if "young" in names else set())
         tangent, still = Tangent.settled(balance, contact.points.gap, contact.load_step.force_n), np.zeros(self.points.count)
-        rows = gap_rates(self.surface, balance.places.compliance.grid, contact.points, self.moving) if wanted & set(_POSE) else []
-        by_name = dict(zip(_POSE, rows, strict=False))
+        by_name = dict(zip(_POSE, self._gap_rates(tangent), strict=True)) if wanted & set(_POSE) else {}
         solved, found = [name for name in (*_POSE, "force") if name in wanted], {}
         if solved:
             gaps, forces = zip(*((by_name.get(name, still), float(name == "force")) for name in solved), strict=True)
@@ -330,6 +339,14 @@ class _Near:
             pair = [Balance(other, self.points, contact) for other in self.others]
             found["thickness"] = tangent.by_compliance(*pair, _apart_mm(self.press.sensor.spec), contact.points.gap)
         return [found[name] for name in names]
+
+    def _gap_rates(self, tangent):
+        """Rates (5, n) of the points' gaps by the pose."""
+        contact, grid = tangent.balance.contact, tangent.balance.places.compliance.grid
+        rates = gap_rates(self.surface, grid, contact.points, self.moving)
+        if not self.aside:
+            return rates
+        return EdgeRates(tangent.balance, tangent.at, self.points.gap.min()).replaced(rates, self.aside)
 
     def maps(self, found, load_steps, names):
         """Rates (k, l, ny, nx) of the maps of all load steps; found[step][name]."""

@@ -13,6 +13,7 @@ docs/notebook/2026-11-23-foundation-model.md.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -121,7 +122,7 @@ class SoftEdges:
     def __init__(self, compliance: FoundationCompliance) -> None:
         self._grid = compliance.grid
         self._by_axis = np.stack([own_compliance(compliance, axis) for axis in (0, 1)])
-        self._last = None
+        self._last: Any = None
 
     def __call__(self, points: ObjectPoints, moved: np.ndarray, depth: float) -> np.ndarray:
         """Contact compliance (c,) in mm/N of `ObjectPoints` with lateral displacements `moved` (2, c) in mm; infinite if uncovered.
@@ -129,14 +130,14 @@ class SoftEdges:
         depth: of the object below its first touch in mm
         """
         contact_compliance = np.zeros(points.count)
-        own, held_at = self._of_nodes(points)
+        own, held_at = self.of_nodes(points)
         reaches = beyond(points.covered_at(moved, rounding_mm=_ROUNDED * depth + _EVEN_MM)[points.edge])
         with np.errstate(divide="ignore"):
             contact_compliance[points.edge] = own * np.maximum(held_at / reaches - 1, 0.0)
         return contact_compliance
 
-    def _of_nodes(self, points):
-        """Compliance (e,) of the nodes near edges among nodes in contact, and distance (e,) in steps of an edge in full contact."""
+    def of_nodes(self, points: ObjectPoints) -> tuple[np.ndarray, np.ndarray]:
+        """Compliance (e,) in mm/N of nodes near edges among nodes in contact; distance (e,) in steps of an edge in full contact."""
         if self._last is None or self._last[0] is not points:
             middle = self._grid.from_middle(points.nodes[points.edge]) % 2
             outwards = points.outwards()

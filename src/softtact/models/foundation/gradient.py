@@ -12,8 +12,8 @@ Sci. Comput. 40 (2018) A817). The
 solver leaves gaps of some micrometres, as it seldom updates where nodes lie under the object, so Newton's method settles the
 balance.
 
-Held besides the active sets: the slopes over the points, and the contact compliance of points beside edges, which changes with the
-share of a point's surroundings that the object covers.
+Held besides the active sets: the slopes over the points. The contact compliance of points beside edges changes with the share of
+their surroundings that the object covers; `models.foundation.edge_rates` gives gap rates of the same effect.
 """
 
 import copy
@@ -195,6 +195,14 @@ class Balance:
         contact, lifted = self.contact, self._moved(at)[self.patches:] - at.rise
         return (np.where(contact.touching, at.force > 0, contact.possible & (self.gaps(at, gap_mm) < 0)),
                 np.where(contact.standing, at.q > 0, lifted < 0))
+
+    def on_points(self, of_patches: np.ndarray) -> np.ndarray:
+        """Forces (n,) in N on points, of forces (c,) on patches; or the contact compliance (n,) of each patch's points."""
+        return of_patches @ self.patch
+
+    def moved(self, at: Unknowns) -> np.ndarray:
+        """Displacements (2, n) in mm of the points sideways."""
+        return self._sideways(self.load(at))
 
     def shift(self, at: Unknowns) -> np.ndarray:
         """Changes (..., c) of the patches' gaps in mm by nodes that move sideways below a slope."""
