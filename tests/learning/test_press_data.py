@@ -4,6 +4,8 @@ import multiprocessing
 import os
 import resource
 import signal
+import subprocess
+import sys
 from dataclasses import replace
 
 import h5py
@@ -22,6 +24,7 @@ from softtact.errors import InputError, OutputError
 from softtact.geometry.pose import Pose
 from softtact.learning import press_blocks, press_data
 from softtact.learning.press_data import PressPlan, behind, presses_left, write_press_data
+from softtact.models.hyperelastic.mesh_settings import MeshSettings, NewtonSettings
 from softtact.outputs import held
 
 
@@ -176,6 +179,34 @@ def test_no_refusal_advises_to_delete_what_holds_finished_presses(whole, ours, t
         write_press_data(tmp_path / "old.h5", ours, workers=1, label="")
 
 
+def test_a_data_set_does_not_go_on_with_other_laws_meshes_or_solver_settings(sensor, ours, tmp_path, monkeypatch):
+    """The sensor's file names its materials; their constants may change between two runs."""
+    path, cover = tmp_path / "a.h5", sensor.laws["cover"]
+    with pytest.raises(KeyboardInterrupt):
+        stopped(path, ours, monkeypatch, interrupt)
+    for change in ({"laws": sensor.laws | {"cover": cover.scaled(1 + 1e-9)}}, {"mesh": MeshSettings(refinement=1)},
+                   {"solver": NewtonSettings.draft()}, {"scatter": (np.full(2000, 1.0), np.full(2000, 1.1))}):
+        with pytest.raises(InputError, match="unfinished data set of other objects or settings"):
+            presses_left(path, replace(ours, sensor=replace(sensor, **change)))
+    assert presses_left(path, replace(ours, sensor=softtact.load_sensor("coro"))) == 2
+
+
+def test_the_settings_of_a_data_set_are_the_same_in_another_process(ours):
+    code = ("import softtact, trimesh; from softtact.learning.press_data import PressPlan; "
+            "meshes = {'box': trimesh.creation.box((8, 12, 5)), 'disc': trimesh.creation.cylinder(radius=4, height=6)}; "
+            "print(PressPlan(softtact.load_sensor('coro'), meshes, 4, [5.0, 20.0], 'elastic', 3).settings)")
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split()[-1] == ours.settings
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"seed": -1}, "seed -1: .* give 0 or more"), ({"meshes": {}}, "no meshes is empty; give 1 object"),
+    ({"fingers": 3}, "fingers 3: .* give 1 or 2"), ({"model": "elastik"}, "Model 'elastik' is unknown; use one of auto, elastic")])
+def test_a_plan_that_no_press_can_follow_is_refused_as_it_is_made(ours, change, said):
+    with pytest.raises(InputError, match=said):
+        replace(ours, **change)
+
+
 def test_another_seed_draws_other_places_and_more_presses_begin_with_the_same(sensor, meshes):
     assert not np.array_equal(plan(sensor, meshes).poses, plan(sensor, meshes, seed=4).poses)
     assert np.array_equal(plan(sensor, meshes).poses, plan(sensor, meshes, presses=9).poses[:4])
@@ -233,6 +264,7 @@ def test_the_command_writes_a_data_set_that_torch_batches(tmp_path, monkeypatch,
     ("--presses 0 --out d.h5", "0 presses is empty"), ("--presses 2 --out d.txt", "d.txt: the format hdf5 is written as .h5"),
     ("--presses 2 --format netcdf --out d.h5", "the format netcdf is written as .nc"),
     ("--presses 2 --force 70 --out d.h5", "--force 70: 70 N is out of the range"),
+    ("--presses 2 --seed -1 --out d.h5", "--seed -1: give 0 or more"),
     ("--presses 2 --out none/d.h5", "there is no folder none"),
     ("--presses 2 --out there.h5", "there is already a finished data set")])
 def test_what_cannot_be_used_is_refused_and_leaves_nothing(more, said, tmp_path, monkeypatch, capsys):

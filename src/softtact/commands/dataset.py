@@ -51,6 +51,8 @@ def _dataset(options):
     check_outputs(options.out)
     check_count("--workers", options.workers)
     check_name(options.out, options.format)
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: give 0 or more.")
     spec = sensor_spec(options.sensor)
     forces = sorted(set(options.force or [force for force in _FORCES_N if force <= spec.force_range_n[1]]))
     check_forces(forces, spec)

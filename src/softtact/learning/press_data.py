@@ -19,7 +19,7 @@ import os
 import shutil
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,7 @@ from softtact.geometry.pose import Pose, draw_poses
 from softtact.learning.lerobot import FPS, same_as, write_lerobot
 from softtact.learning.press_blocks import BLOCK, PressBlocks
 from softtact.outputs import held, not_written, target_of
+from softtact.press.kinds import KINDS
 from softtact.progress import progress
 from softtact.readout.taxels import need_whole_counts, whole_counts
 
@@ -70,14 +71,21 @@ class PressPlan:
         self.sensor.spec.need_layers()
         self.sensor.spec.need_taxels("a data set of presses")
         need_whole_counts(self.sensor.spec, "a data set of presses")
+        KINDS[self.sensor.spec.kind].press(self.model, self.sensor.spec.name)     # refuses an unknown model
         if self.presses < 1:
             raise InputError(f"A data set of {self.presses} presses is empty; give 1 or more.")
+        if not self.meshes:
+            raise InputError("A data set of no meshes is empty; give 1 object or more.")
+        if self.fingers not in (1, 2):
+            raise InputError(f"fingers {self.fingers}: an object is pressed by one finger or between two; give 1 or 2.")
+        if self.seed < 0:
+            raise InputError(f"seed {self.seed}: places are drawn from whole numbers that are not negative; give 0 or more.")
 
     @cached_property
     def settings(self) -> str:
         """Hash of all settings that determine the numbers."""
         shapes = {name: digest([mesh.vertices.tolist(), mesh.faces.tolist()]) for name, mesh in self.meshes.items()}
-        return digest([self.sensor.spec.model_dump(mode="json"), shapes, list(self.meshes), self.presses, list(self.forces_n),
+        return digest([_of_sensor(self.sensor), shapes, list(self.meshes), self.presses, list(self.forces_n),
                        self.model, self.seed, self.fingers, softtact.__version__])
 
     @cached_property
@@ -91,6 +99,14 @@ class PressPlan:
     def mesh_of(self, number: int) -> trimesh.Trimesh:
         """The mesh of a press."""
         return list(self.meshes.values())[number % len(self.meshes)]
+
+
+def _of_sensor(sensor):
+    """What a sensor's presses depend on, as plain values: its file names materials, whose constants are in its laws."""
+    laws = {name: [repr(law), law.parameters, law.bulk_modulus, law.stretch_window, repr(law.inelastic)]
+            for name, law in sensor.laws.items()}
+    scatter = sensor.scatter and [np.asarray(factors).tolist() for factors in sensor.scatter]
+    return [sensor.spec.model_dump(mode="json"), laws, asdict(sensor.mesh), asdict(sensor.solver), scatter]
 
 
 def behind(mesh: trimesh.Trimesh, pose: Pose) -> Pose:
