@@ -25,6 +25,25 @@ def test_a_flat_punch_has_its_depth_inside_a_square_that_nearness_enlarges():
     assert (depth[outside] == 0).all() and (depth[:, outside] == 0).all()
 
 
+@pytest.mark.parametrize("down", [0.3, 1.5, 3.0])
+def test_rays_that_pass_beside_a_box_at_the_surface_meet_its_lower_face_below(down):
+    """A side of 8 mm is seen 8 (35 / (35 - down)) mm wide, up to 175 px in place of 160."""
+    fine = Pinhole(241, 241, 0.05, 35.0)
+    depth = DepthCamera(_box(8.0), fine, deepest_mm=3.0, reach_mm=1.0).image(down, np.zeros(2))
+    for line in (depth[120], depth[:, 120]):
+        assert (line > 0).sum() == pytest.approx(8 * 35 / (35 - down) / 0.05, abs=1)
+        assert line[line > 0] == pytest.approx(down, abs=1e-3)
+
+
+def test_a_ray_sees_the_nearer_of_two_faces():
+    """A plate over a pin of 2 mm: beside the pin, whose lower face hides a rim of it, the plate is seen."""
+    pin, plate = _box(2.0, 1.0), trimesh.creation.box((8.0, 8.0, 2.0))
+    plate.apply_translation([0, 0, 2.0])
+    depth = DepthCamera(trimesh.util.concatenate(pin, plate), PINHOLE, deepest_mm=3.0, reach_mm=0.0).image(2.0, np.zeros(2))[31]
+    assert depth[np.abs(X) < 35 / 33 - 0.13] == pytest.approx(2.0, abs=1e-3)
+    assert depth[(np.abs(X) > 35 / 33 + 0.13) & (np.abs(X) < 4 * 35 / 34 - 0.13)] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_ball_has_the_depth_of_its_cap():
     ball = trimesh.creation.icosphere(subdivisions=5, radius=4.0)
     ball.apply_translation([0, 0, 4.0])

@@ -1,20 +1,22 @@
 """Depth images of a rigid object that moves on a gel: a z-buffer of its underside, seen through the gel by the camera behind it.
 
-The camera's rays are followed from the deepest plane up to the surface at rest. A ray meets the object where its height reaches
-that of the underside, found by halving intervals. Exact to the triangles up to half a pixel; no graphics library is needed.
+The rays of the camera are followed from the lowest point that they may meet up to the surface at rest, in steps of one point of
+the underside at most. A ray meets the object where it first reaches the height of the underside, found by halving the last step.
+Exact to the triangles up to half a pixel; no graphics library is needed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scipy.ndimage import minimum_filter
 
 from softtact.compiled import compiled
 from softtact.contact.height_field import HeightField
 from softtact.imaging.pinhole import Pinhole
 
-_FINER = 2           # points of the underside for each pixel of the surface at rest
-_HALVINGS = 12       # of the deepest depth: 3 mm to 0.7 um
+_FINER = 2                # points of the underside for each pixel of the surface at rest
+_PRECISION_MM = 7e-4      # of a depth
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class DepthCamera:
         touch = np.nanmin(heights) if first_touch_mm is None else first_touch_mm
         self._first = np.array([x[0], y[0]])
         self._heights = np.where(np.isnan(heights), np.inf, heights - touch)
+        aside = int(np.ceil(np.abs(self._directions).max() * deepest_mm / self._spacing))      # of a ray below the surface at rest
+        self._lowest = minimum_filter(self._heights, 2 * aside + 3)
 
     def image(self, down_mm: float, aside_mm: np.ndarray) -> np.ndarray:
         """(rows, columns) depth in mm of the underside below the surface at rest, 0 to the deepest, after a displacement.
@@ -79,24 +83,32 @@ class DepthCamera:
         down_mm: from first touch, positive;  aside_mm: (2,) along x and y
         """
         first = self._first + np.asarray(aside_mm, dtype=float)
-        depth = _depths(self._directions, self._heights, first, self._spacing, float(down_mm), self.pinhole.distance_mm,
-                        self.deepest_mm)
+        depth = _depths(self._directions, self._heights, self._lowest, first, self._spacing, float(down_mm),
+                        self.pinhole.distance_mm, self.deepest_mm)
         return depth.reshape(self.pinhole.rows, self.pinhole.columns)
 
 
 @compiled
-def _depths(directions, heights, first, spacing, down, distance, deepest):
-    """Depths (n,) at which rays (n, 2), mm along x and y for each mm from the pinhole, meet the underside."""
+def _depths(directions, heights, lowest, first, spacing, down, distance, deepest):
+    """Depths (n,) at which rays (n, 2), mm along x and y for each mm from the pinhole, meet the underside.
+
+    lowest: the least of all heights that a ray passes, at its place on the surface at rest
+    """
     found = np.zeros(len(directions))
     for k in range(len(directions)):
         u, v = directions[k]
-        if not _meets(u, v, 0.0, heights, first, spacing, down, distance):
+        start = min(deepest, down - _height(u * distance, v * distance, lowest, first, spacing))      # deeper it meets nothing
+        if start <= 0:
             continue
-        above, below = 0.0, deepest      # the depth lies between
-        if _meets(u, v, deepest, heights, first, spacing, down, distance):
-            found[k] = deepest
-            continue
-        for _ in range(_HALVINGS):
+        steps = int(np.ceil(max(abs(u), abs(v)) * start / spacing)) + 1
+        above, below, met = start, start, False      # the depth lies between
+        for step in range(steps, -1, -1):
+            above = start * step / steps
+            met = _meets(u, v, above, heights, first, spacing, down, distance)
+            if met:
+                break
+            below = above
+        while met and below - above > _PRECISION_MM:
             middle = 0.5 * (above + below)
             if _meets(u, v, middle, heights, first, spacing, down, distance):
                 above = middle
@@ -109,8 +121,13 @@ def _depths(directions, heights, first, spacing, down, distance, deepest):
 @compiled
 def _meets(u, v, depth, heights, first, spacing, down, distance):
     """Whether a ray is within the object at a depth."""
-    column = int(np.round((u * (distance - depth) - first[0]) / spacing))
-    row = int(np.round((v * (distance - depth) - first[1]) / spacing))
+    return _height(u * (distance - depth), v * (distance - depth), heights, first, spacing) - down < -depth
+
+
+@compiled(inline="always")
+def _height(x, y, heights, first, spacing):
+    """The height at the grid's point next to a place; infinite outside the grid."""
+    column, row = int(np.round((x - first[0]) / spacing)), int(np.round((y - first[1]) / spacing))
     if row < 0 or column < 0 or row >= heights.shape[0] or column >= heights.shape[1]:
-        return False
-    return heights[row, column] - down < -depth
+        return np.inf
+    return heights[row, column]
