@@ -83,13 +83,22 @@ def test_light_that_alpha_holds_back_does_not_count():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("noise", "background"), [(0.002, 0.03), (0.004, 0.0), (0.02, 0.1)])
-def test_what_compression_leaves_in_a_dark_frame_is_neither_a_mask_nor_a_contact(noise, background):
+@pytest.mark.parametrize("transfer", ["linear", "srgb"])
+@pytest.mark.parametrize(("noise", "background"), [(0.002, 0.03), (0.004, 0.0), (0.008, 0.055), (0.02, 0.1)])
+def test_what_compression_leaves_in_a_dark_frame_is_neither_a_mask_nor_a_contact(noise, background, transfer):
     dark = render_frame([], [], [], Camera(1.0, 1.0, noise=noise, falloff=0.0, background=background),
                         footprint_mm=(200, 150), seed=0)
     packed = iio.imread(iio.imwrite("<bytes>", dark, extension=".jpg", quality=75), extension=".jpg")
-    assert detect_discs(packed, pixel_mm=1.0, lossy=True).empty
-    assert detect_discs(packed.astype(np.uint16) << 8, pixel_mm=1.0, lossy=True).empty
+    for frame in (packed, packed.astype(np.uint16) << 8):
+        assert detect_discs(frame, pixel_mm=1.0, transfer=transfer, lossy=True).empty
+        assert grey(frame, transfer=transfer, lossy=True).max() <= 1
+
+
+@pytest.mark.parametrize("frame", [
+    pytest.param(np.round(255 * srgb(0.04 * SHARE)).astype(np.uint8), id="8 bits"),
+    pytest.param(np.round(255 * srgb(0.04 * SHARE)).astype(np.uint16), id="8 bits in 16")])
+def test_a_dark_frame_encoded_for_a_screen_keeps_its_full_scale(frame):
+    assert grey(frame, transfer="srgb").max() == pytest.approx(0.04 * SHARE.max(), rel=0.1)
 
 
 @pytest.mark.parametrize(("frame", "said"), [

@@ -41,8 +41,7 @@ def grey(frame: np.ndarray, *, transfer: str = "linear", lossy: bool = False) ->
     colours, opacity = _colours_and_opacity(frame)
     whole = frame.dtype.kind in "ui" or bool((colours == np.rint(colours)).all())
     if transfer == "srgb":
-        colours = _from_srgb(colours, whole=whole, depth=frame.dtype.itemsize)
-        whole = False
+        colours = _from_srgb(colours, _encoded_scale(frame, colours, whole=whole, lossy=lossy))
     elif transfer != "linear":
         raise InputError(f"transfer={transfer!r}: give one of {', '.join(TRANSFERS)}.")
     light = colours.mean(axis=2) * opacity
@@ -51,9 +50,9 @@ def grey(frame: np.ndarray, *, transfer: str = "linear", lossy: bool = False) ->
     bottom, span, noise = _shared_range(light)
     light = _without_outliers(light, bottom, span, noise)
     on_a_scale = lossy or (frame.dtype == np.uint8 and not _is_mask(light, span))
-    if transfer == "linear" and frame.dtype.kind == "u" and on_a_scale:
-        return light / np.iinfo(frame.dtype).max
-    return (light - bottom) / _full_scale(light, bottom, span, noise, whole=whole)
+    if frame.dtype.kind == "u" and on_a_scale:
+        return light if transfer == "srgb" else light / np.iinfo(frame.dtype).max
+    return (light - bottom) / _full_scale(light, bottom, span, noise, whole=whole, decoded=transfer == "srgb")
 
 
 def _checked(frame):
@@ -88,10 +87,18 @@ def _colours_and_opacity(frame):
     return colours, alpha / alpha.max()
 
 
-def _from_srgb(colours, *, whole, depth):
-    """Light from sRGB values, on a scale from 0 to 1."""
+def _encoded_scale(frame, colours, *, whole, lossy):
+    """The sRGB value of full light."""
+    if frame.dtype.itemsize == 1:
+        return 255.0
+    if lossy and frame.dtype.kind == "u":
+        return float(np.iinfo(frame.dtype).max)
     highest = float(minimum_filter(colours.mean(axis=2), _SHARED).max())
-    full = 255.0 if depth == 1 else _whole_scale(highest) if whole else max(highest, 1.0)
+    return _whole_scale(highest) if whole else max(highest, 1.0)
+
+
+def _from_srgb(colours, full):
+    """Light from sRGB values up to `full`, on a scale from 0 to 1."""
     share = np.clip(colours / full, 0.0, 1.0)
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
@@ -141,12 +148,12 @@ def _is_mask(light, span):
     return np.count_nonzero(median_filter(light, _SHARED) != light) < _FRAYED * border
 
 
-def _full_scale(light, bottom, span, noise, *, whole):
-    """The light, above the lowest value, that becomes 1."""
+def _full_scale(light, bottom, span, noise, *, whole, decoded):
+    """The light, above the lowest value, that becomes 1; decoded: whether it is a share of full scale, from sRGB values."""
     if _is_mask(light, span):
         return span
     if whole:
-        return _whole_scale(span)
+        return 1.0 if decoded else _whole_scale(span)
     if light.min() >= 0 and light.max() <= 1 and bottom + span > _DIM:
         return 1.0
     return span if span > 5 * noise else max(float(np.abs(light).max()), 1.0)
