@@ -37,7 +37,8 @@ def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[s
             ("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's validity, "
              "which are left out.", draw_time(result)),
             ("Each taxel: its gain over the common one, its zero, the root mean square of its residuals.", draw_taxels(result)),
-            ("Root mean square residual of each taxel, one map for each recording.", draw_residuals(result))):
+            ("Root mean square residual of each taxel, one map for each recording; no number where none of its readings was used.",
+             draw_residuals(result))):
         page.figure(_png(figure), caption)
     if advice:
         page.section("Which press would help most", anchor="advice")
@@ -89,36 +90,49 @@ def draw_taxels(result: CalibrationResult) -> "Figure":
     plt = pyplot()
     figure, axes = plt.subplots(1, 3, figsize=(9.5, 4.2), layout="constrained")
     gain = 100 * (result.linear.gain / result.linear.scale - 1)
-    rms = np.sqrt(np.mean(np.concatenate([part for part in _residuals(result)]) ** 2, axis=0))
+    rms = _root_mean_square(np.concatenate(_residuals(result)))
     for axis, values, title, unit, cmap in ((axes[0], gain, "gain over the common one", "%", "PuOr"),
                                             (axes[1], result.linear.zero, "zero", "counts", "PuOr"),
                                             (axes[2], rms, "residual, root mean square", "counts", "viridis")):
-        limit = float(np.abs(values).max()) or 1.0
+        limit = _largest(np.abs(values))
         _draw_map(figure, axis, values, title, unit, cmap, (-limit, limit) if cmap == "PuOr" else (0.0, limit))
     return figure
 
 
 def draw_residuals(result: CalibrationResult) -> "Figure":
     """A map of the root mean square residuals for each recording."""
-    experiments, maps = result.problem.experiments, [np.sqrt(np.mean(part**2, axis=0)) for part in _residuals(result)]
+    experiments, maps = result.problem.experiments, [_root_mean_square(part) for part in _residuals(result)]
     figure, axes = pyplot().subplots(1, len(maps), figsize=(3.2 * len(maps), 4.2), squeeze=False, layout="constrained")
-    highest = max(float(one.max()) for one in maps) or 1.0
+    highest = _largest(np.stack(maps))
     for axis, one, values in zip(axes[0], experiments, maps, strict=True):
         _draw_map(figure, axis, values, Path(one.name).name, "counts", "viridis", (0.0, highest))
     return figure
 
 
 def _residuals(result):
-    """Measured minus calibrated counts (b, row, column) of each recording, 0 for readings that were left out."""
+    """Measured minus calibrated counts (b, row, column) of each recording, nan for readings that were left out."""
     _, inverse = result.problem.stacked()
     ends = np.cumsum([len(one.counts) for one in result.problem.experiments])[:-1]
-    return [np.where(used > 0, one.counts - counts, 0.0) for one, counts, used in
+    return [np.where(used > 0, one.counts - counts, np.nan) for one, counts, used in
             zip(result.problem.experiments, result.counts, np.split(inverse, ends), strict=True)]
+
+
+def _root_mean_square(residuals):
+    """Of residuals (b, row, column) that are not nan, for each taxel (row, column); nan for one without any."""
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(np.nansum(residuals**2, axis=0) / np.isfinite(residuals).sum(axis=0))
+
+
+def _largest(values):
+    """The end of a scale for values of which some are nan; 1 where there are none above 0."""
+    return float(np.nan_to_num(values).max()) or 1.0
 
 
 def _draw_map(figure, axis, values, title, unit, cmap, limits):
     image = axis.imshow(values, origin="lower", vmin=limits[0], vmax=limits[1], cmap=cmap)
     for (row, column), value in np.ndenumerate(values):
+        if np.isnan(value):     # of a taxel whose readings were all left out
+            continue
         light = (value - limits[0]) / (limits[1] - limits[0])
         dark = not 0.2 < light < 0.8 if cmap == "PuOr" else light < 0.6
         axis.text(column, row, f"{value:.1f}", ha="center", va="center", fontsize=7, color="white" if dark else "black")
