@@ -6,8 +6,8 @@ import pytest
 from softtact.evaluation.limits import limits
 
 
-def curve(model, half, full, *, set_name="unseen"):
-    return pd.DataFrame({"model": model, "architecture": "compact", "maps": [50, 100], "set": set_name, "ssim": [half, full]})
+def curve(model, half, full, *, set_name="unseen", architecture="compact"):
+    return pd.DataFrame({"model": model, "architecture": architecture, "maps": [50, 100], "set": set_name, "ssim": [half, full]})
 
 
 def scored(model, printed, compact, *, set_name="unseen", mean=0.5):
@@ -48,3 +48,17 @@ def test_without_a_reference_nothing_is_said_of_a_perfect_model():
 def test_a_network_below_the_mean_reading_is_not_trained_whatever_else_would_gain():
     found = row(half=0.6, full=0.8, perfect=0.95, printed=0.45, compact=0.79)
     assert found.limit == "training" and "not trained, for the mean training reading at that force has 0.500" in found.sentence
+
+
+@pytest.mark.parametrize(("kinds", "brought"), [(("compact", "printed"), 0.1), (("printed",), 0.3), (("searched",), 0.2),
+                                                (("searched", "printed"), 0.3)])
+@pytest.mark.parametrize("reference", ["compact", None])
+def test_a_learning_curve_is_judged_by_one_network_and_a_reference_that_has_it(kinds, brought, reference):
+    """The compact one, or else the study's; the reference is learnt by the compact network, or not at all."""
+    gains = {"compact": 0.1, "searched": 0.2, "printed": 0.3}
+    curves = [curve("elastic", 0.8 - gains[kind], 0.8, architecture=kind) for kind in kinds]
+    curves += [curve("reference", 0.9, 0.9, architecture=reference)] if reference else []
+    found = limits(pd.concat(curves), scored("elastic", 0.8, 0.79), architecture="printed", tested=["elastic"],
+                   reference="reference", source="virtual sensor").iloc[0]
+    assert found.more_maps_gain == pytest.approx(brought)
+    assert found.perfect_model_gain == pytest.approx(0.1 if reference in kinds else float("nan"), nan_ok=True)

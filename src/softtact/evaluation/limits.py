@@ -4,6 +4,7 @@ Three differences of mean SSIM, each with all else equal:
 model    the same network on the reference model's maps, from which the readings were made, minus on the tested model's maps
 data     all maps minus the next smaller number of maps (the same network, equal steps)
 network  the best network on the same maps (the two of the study and that of the learning curve) minus the study's
+The learning curve is that of one network: the compact one, which the reference has, too, or else the study's, without `model`.
 The largest difference above `CLEAR` is reported as the limit. A network that predicts worse than the mean training reading at that
 force counts as not trained, which is reported instead. These numbers do not affect any choice of the study.
 The constants of SSIM reduce the effect of errors in faint maps, so a score depends on the gain of the readings; see `gain_table`.
@@ -42,15 +43,21 @@ def limits(curves: pd.DataFrame, networks: pd.DataFrame, *, architecture: str, t
     curves: learning_curve.csv of all models, the reference's (where there is one) among them;  networks: networks.csv
     architecture: the study's;  source: of the readings
     """
-    compact = curves[curves.architecture == "compact"] if "compact" in set(curves.architecture) else curves
     rows = []
     for model in tested:
+        of_network = curves[curves.architecture == _network_of(curves[curves.model == model], architecture)]
         for set_name in curves["set"].unique():
             scored = networks[(networks.model == model) & (networks["set"] == set_name)].set_index("architecture")
-            of_set = compact[compact["set"] == set_name]
+            of_set = of_network[of_network["set"] == set_name]
             rows.append(_row(model, set_name, scored, of_set[of_set.model == model], of_set[of_set.model == reference],
                              architecture=architecture, source=source))
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _network_of(curve, architecture):
+    """The network of a model's learning curve that is judged: the compact one, the study's, or its first."""
+    there = list(curve.architecture)
+    return next(name for name in ("compact", architecture, *there) if name in there)
 
 
 def _row(model, set_name, scored, curve, perfect, *, architecture, source):
