@@ -143,7 +143,8 @@ def test_figure_10_has_a_line_per_model_and_set_with_intervals_and_the_ceiling()
     curves = pd.DataFrame([{"model": model, "architecture": "compact", "set": name, "maps": maps, "ssim": 0.5 + 0.001 * maps,
                             "ssim_low": 0.4, "ssim_high": 0.8} for model in ("elastic", "reference")
                            for name in ("validation", "grasps") for maps in (10, 100)])
-    figure = fig10_learning_curve.draw(curves, CEILING)
+    figure = fig10_learning_curve.draw(curves, CEILING, choices={"window": 5, "data_range": 1200.0})
+    assert figure.axes[0].get_ylabel() == "SSIM (window 5, range 1200 counts)"
     assert [axes.get_title() for axes in figure.axes] == ["validation", "grasps"]
     for axes in figure.axes:
         assert len(axes.containers) == 2 and len(axes.collections) == 2 and axes.get_xscale() == "log"

@@ -280,7 +280,7 @@ if CURVES:
         params:
             code=code("draw_fig10_learning_curve"),
             files=files,
-            settings=as_settings(),
+            settings=as_settings(ssim=plain(STUDY.values.ssim)),
         shell:
             run_stage("draw_fig10_learning_curve")
 

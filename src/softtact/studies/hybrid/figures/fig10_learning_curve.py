@@ -1,8 +1,8 @@
 """Figure 10: SSIM against the number of training maps, one panel per set."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot
+from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot, ssim_label
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -11,8 +11,11 @@ if TYPE_CHECKING:
 MARKS = {"elastic": "s", "foundation": "D", "hyperelastic": "o"}      # distinct in grey, too
 
 
-def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame") -> "Figure":
-    """Figure from one frame with the learning_curve.csv of all models, and ceiling.csv."""
+def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame", *, choices: dict[str, Any] | None = None) -> "Figure":
+    """Figure from one frame with the learning_curve.csv of all models, and ceiling.csv.
+
+    choices: {window, data_range} of the SSIM
+    """
     plt = pyplot()
     sets = list(curves["set"].unique())
     figure, panels = plt.subplots(1, len(sets), figsize=(3.6 * len(sets), 4.2), sharey=True, squeeze=False, layout="constrained")
@@ -25,7 +28,7 @@ def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame") -> "Figure":
         sizes = sorted(curves.maps.unique())
         axes.set_xticks(sizes, sizes, rotation=45)
         axes.minorticks_off()
-    panels[0, 0].set_ylabel("SSIM (window 3, range 2400 counts)")
+    panels[0, 0].set_ylabel(ssim_label(choices))
     figure.legend(*panels[0, 0].get_legend_handles_labels(), frameon=False, fontsize=8, ncols=3, loc="outside lower center")
     return figure
 

@@ -157,13 +157,13 @@ def draw_fig9_networks(*, inputs: Named, outputs: Named, settings: Named, thread
 def draw_fig10_learning_curve(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
     """Figure 10: SSIM against the number of training maps.
 
-    inputs: curves (list of CSV, one per model), ceiling
+    inputs: curves (list of CSV, one per model), ceiling;  settings: ssim {window, data_range}
     """
     from softtact.reporting.style import save
     from softtact.studies.hybrid.figures.fig10_learning_curve import draw
 
     curves = pd.concat(map(read_csv, inputs["curves"]))
-    save(draw(curves, read_csv(inputs["ceiling"])), outputs["png"], outputs["svg"])
+    save(draw(curves, read_csv(inputs["ceiling"]), choices=settings["ssim"]), outputs["png"], outputs["svg"])
 
 
 def _outline(mesh, y, depth):
