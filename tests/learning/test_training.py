@@ -113,6 +113,14 @@ def test_a_checkpoint_of_another_training_is_not_taken_up(train, validation, tmp
     assert same_weights(run, train_to_end(new_run(train), train, make_samples(6, first=200)))
 
 
+def test_a_training_does_not_go_on_from_one_whose_history_has_another_ssim(train, validation, tmp_path):
+    train_to_end(new_run(train), train, validation, checkpoint=tmp_path / "c.pt", stop_after=2)
+    other, options = new_run(train), Training(epochs=4, batch=4)
+    records = train_network(other, train, validation, options=options, ssim=SSIM | {"data_range": 100.0}, seed=1,
+                            checkpoint=tmp_path / "c.pt")
+    assert [record["epoch"] for record in records] == [1, 2, 3, 4]
+
+
 def test_checkpoints_keep_their_distance_in_time(train, validation, tmp_path):
     train_to_end(new_run(train), train, validation, checkpoint=tmp_path / "c.pt", checkpoint_every_s=3600)
     assert not (tmp_path / "c.pt").exists()

@@ -23,7 +23,7 @@ from softtact.files import digest
 from softtact.learning.image_data import ImageSequences, from_network, to_network
 from softtact.learning.image_networks import ImageGenerator, PatchDiscriminator, adversarial_loss, count_weights
 from softtact.learning.image_settings import ImageTraining
-from softtact.learning.network import load, save
+from softtact.learning.network import resume, save
 from softtact.progress import Watch
 
 # Measured: 0.20 GB of the reduced networks with 26 frames, 0.59 GB with 208, 1.52 GB of the printed ones with 2.
@@ -125,7 +125,7 @@ def train_images(run: ImageRun, data: ImageSequences, *, options: ImageTraining,
     """
     device = next(run.generator.parameters()).device
     owner = _training_digest(run, data, options, seed)
-    _resume(run, checkpoint, owner)
+    resume(run, checkpoint, owner)
     watch, saved = Watch(label), time.monotonic()
     for _ in range(len(run.history), options.epochs):
         batches = _batches(data, options, seed=seed, epoch=len(run.history))
@@ -165,13 +165,6 @@ def _training_digest(run: ImageRun, data: ImageSequences, options: ImageTraining
     """Hash of data and settings, so that a training does not resume from the checkpoint of another."""
     networks = [run.generator.options, run.discriminator.options]
     return digest([options.model_dump(exclude={"checkpoint_every_s"}), seed, networks, data.digest(), torch.__version__])
-
-
-def _resume(run: ImageRun, checkpoint: Path | None, owner: str) -> None:
-    if checkpoint is not None and Path(checkpoint).exists():
-        state = load(checkpoint)
-        if state["owner"] == owner:
-            run.load_state(state)
 
 
 def generate(generator: ImageGenerator, grey: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ are stored with the weights; input and output are in mm and counts.
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -28,6 +28,13 @@ from softtact.checksums import checked
 from softtact.errors import InputError
 from softtact.files import atomic_path
 from softtact.inputs import check_input, check_limit
+
+
+class Resumable(Protocol):
+    """A training that goes on from the contents of a checkpoint."""
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Continue from `state`."""
 
 
 class TactileNetwork(nn.Module):
@@ -173,6 +180,14 @@ def load(path: str | Path) -> dict[str, Any]:
     except Exception:  # torch passes on any error of its unpickler, with advice to load the file although it may run code
         raise InputError(f"{path}: not a network's file: it is damaged, or holds more than tensors and plain values; take a copy "
                          "of it, or train again.") from None
+
+
+def resume(run: Resumable, checkpoint: Path | None, owner: str) -> None:
+    """Load `checkpoint` into `run` if it exists and belongs to the owner."""
+    if checkpoint is not None and Path(checkpoint).exists():
+        state = load(checkpoint)
+        if state["owner"] == owner:
+            run.load_state(state)
 
 
 def _reason(error):

@@ -21,7 +21,7 @@ import torch
 
 from softtact.errors import ConvergenceError, InputError
 from softtact.files import digest
-from softtact.learning.network import ARCHITECTURES, load, predict, save, summed_l1
+from softtact.learning.network import ARCHITECTURES, predict, resume, save, summed_l1
 from softtact.progress import announce, progress
 from softtact.readout.ssim import map_ssim
 
@@ -111,7 +111,7 @@ def train_network(run: Run, train: "Samples", validation: "Samples", *, options:
     """
     data = _tensors(train, run)
     rate = run.optimiser.param_groups[0]["lr"]
-    owner = training_digest(run, train, validation, options, seed)
+    owner = training_digest(run, train, validation, options, ssim, seed)
     resume(run, checkpoint, owner)
     saved = time.monotonic()
     while run.epoch < options.epochs and not out_of_patience(run, options.patience):
@@ -176,20 +176,12 @@ def out_of_patience(run: Run, patience: int) -> bool:
     return run.epoch - run.best["epoch"] >= patience
 
 
-def training_digest(run: Run, train: "Samples", validation: "Samples", options: "Training", seed: int) -> str:
+def training_digest(run: Run, train: "Samples", validation: "Samples", options: "Training", ssim: dict[str, Any], seed: int) -> str:
     """Hash of data and settings, so that a training does not resume from the checkpoint of another."""
     choices = options.model_dump(exclude={"checkpoint_every_s", "threads"})
     rate = run.optimiser.param_groups[0]["lr"]
     network = [run.network.architecture, run.network.options]
-    return digest([choices, rate, seed, network, train.digest(), validation.digest(), torch.__version__])
-
-
-def resume(run: Run, checkpoint: Path | None, owner: str) -> None:
-    """Load `checkpoint` into `run` if it exists and belongs to the owner."""
-    if checkpoint is not None and Path(checkpoint).exists():
-        state = load(checkpoint)
-        if state["owner"] == owner:
-            run.load_state(state)
+    return digest([choices, rate, ssim, seed, network, train.digest(), validation.digest(), torch.__version__])
 
 
 def _tensors(samples, run):
