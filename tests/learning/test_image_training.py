@@ -113,6 +113,12 @@ def test_an_interrupted_training_ends_with_the_same_weights(tmp_path):
     assert torch.equal(_weights(second), _weights(whole))
 
 
+@pytest.mark.parametrize("momenta", [[0.5, 1.0], [-0.1, 0.9], [float("nan"), 0.9]])
+def test_momenta_that_adam_does_not_take_are_refused_with_their_key(momenta):
+    with pytest.raises(InputError, match="networks.training.momenta"):
+        ImageTraining.from_dict({"momenta": momenta}, where="networks.training")
+
+
 def test_a_checkpoint_of_another_training_is_not_resumed(tmp_path):
     options, file = OPTIONS.model_copy(update={"checkpoint_every_s": 1e-9}), tmp_path / "checkpoint.pt"
     list(train_images(_run(), _sequences(), options=options, seed=0, checkpoint=file))

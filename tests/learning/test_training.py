@@ -153,3 +153,8 @@ def test_the_schedule_falls_from_the_rate_towards_zero():
 def test_a_loss_that_is_not_finite_stops_the_training_with_the_remedy(train, validation):
     with pytest.raises(ConvergenceError, match="lower the learning rate"):
         train_to_end(new_run(train, rate=1e30), train, validation)
+
+
+def test_a_training_of_one_step_that_runs_away_is_told_by_its_validation_loss(train, validation):
+    with pytest.raises(ConvergenceError, match=r"epoch 1: the validation loss is not finite at learning rate 1e\+30; lower"):
+        train_to_end(new_run(train, rate=1e30), train, validation, epochs=1, batch=16)

@@ -1,8 +1,12 @@
 """Which networks of marker images there are, and how they are trained; read without torch."""
 
+from typing import Annotated
+
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from softtact.learning.settings import Settings
+
+Momentum = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 NETWORKS: dict[str, dict[str, int]] = {
     "proposed": {"lstm_layers": 2, "temporal": 1},
@@ -19,7 +23,7 @@ class ImageTraining(Settings):
     epochs: PositiveInt = 20
     constant_epochs: PositiveInt = Field(10, description="with the first rate; then it falls linearly to 0")
     learning_rate: PositiveFloat = 2e-4
-    momenta: tuple[NonNegativeFloat, NonNegativeFloat] = Field((0.5, 0.999), description="of Adam")
+    momenta: tuple[Momentum, Momentum] = Field((0.5, 0.999), description="of Adam")
     l1_weight: NonNegativeFloat = Field(100.0, description="of the mean absolute error of pixels beside the adversarial loss")
     shuffle_frames: bool = Field(False, description="steps take frames of all sequences in random order: Pix2Pix")
     frames: PositiveInt = Field(26, description="of a step with shuffled frames")

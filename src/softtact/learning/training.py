@@ -108,6 +108,7 @@ def train_network(run: Run, train: "Samples", validation: "Samples", *, options:
 
     checkpoint: file to resume from, if it belongs to this training, and to write to; None for no file
     ssim: window and data_range of the SSIM in the records
+    Raises ConvergenceError if a loss is not finite.
     """
     data = _tensors(train, run)
     rate = run.optimiser.param_groups[0]["lr"]
@@ -120,6 +121,9 @@ def train_network(run: Run, train: "Samples", validation: "Samples", *, options:
         record["train_loss"] = train_epoch(run, *data, rate=record["learning_rate"], batch=options.batch, seed=seed,
                                            label=epoch_label(label, run, options))
         record |= validate(run.network, validation, ssim)
+        if not math.isfinite(record["validation_loss"]):
+            raise ConvergenceError(f"{label}, epoch {record['epoch']}: the validation loss is not finite at learning rate "
+                                   f"{rate:g}; lower the learning rate.")
         record["wall_time_s"] = time.monotonic() - start
         keep_best(run, record)
         run.history.append(record)
