@@ -3,8 +3,11 @@
 import os
 from pathlib import Path
 
+import imagecodecs
 import numpy as np
 import pytest
+import tifffile
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from softtact.errors import InputError
@@ -97,6 +100,57 @@ def test_an_image_without_markers_is_refused_in_a_sentence():
 def test_a_limit_that_is_no_length_is_refused():
     with pytest.raises(InputError, match="limit_px is 0"):
         track(np.zeros((1, 2)), np.zeros((1, 2)), limit_px=0)
+
+
+@pytest.mark.parametrize(("image", "radius", "said"), [
+    (np.full((12, 12), 200.0), None, r"shape \(12, 12\) shows no markers; .* 17 pixels a side at least"),
+    (np.zeros((40, 40, 5)), None, r"shape \(40, 40, 5\) shows no markers"),
+    (np.where(np.arange(1600).reshape(40, 40) == 83, np.nan, 200.0), None, r"not finite numbers, the first at .* \(2, 3\)"),
+    *((np.full((40, 40), 200.0), radius, "radius_px is .*; give that of a marker in px, from 1 to half")
+      for radius in (0.0, -3.0, np.nan, np.inf, 21.0))])
+def test_an_image_or_a_radius_that_no_marker_has_is_refused_in_a_sentence(image, radius, said):
+    with pytest.raises(InputError, match=said):
+        find_markers(image, radius_px=radius)
+
+
+def test_the_smallest_image_is_searched():
+    assert len(find_markers(drawn([(8.0, 8.0)], radius=2.5, shape=(17, 17))).px) == 1
+
+
+@pytest.mark.parametrize("colours", [1, 3])
+def test_alpha_is_no_light(colours):
+    image = drawn(grid())[..., :colours]
+    alpha = np.full((*image.shape[:2], 1), 255, dtype=np.uint8)
+    assert np.array_equal(find_markers(np.dstack([image, alpha])).contrast, find_markers(image).contrast)
+
+
+@pytest.mark.parametrize("channels", [0, slice(None)])
+def test_a_picture_of_16_bits_has_the_grey_levels_of_that_of_8(channels, tmp_path):
+    levels = drawn(grid())[..., channels]
+    (tmp_path / "a.png").write_bytes(imagecodecs.png_encode(levels.astype(np.uint16) * 257))
+    tifffile.imwrite(tmp_path / "a.tif", levels.astype(np.uint16) * 257)
+    for name in ("a.png", "a.tif"):
+        read = read_image(tmp_path / name)
+        assert read.dtype == np.uint8 and np.array_equal(read, np.dstack([levels] * 3) if levels.ndim == 2 else levels)
+
+
+def test_a_picture_is_read_upright_without_alpha_and_as_it_is_stored(tmp_path):
+    levels, exif = drawn(grid()), Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(np.dstack([levels, levels[..., :1]])).save(tmp_path / "a.png", exif=exif)
+    Image.fromarray(levels[..., 0]).convert("LA").save(tmp_path / "la.png")
+    Image.fromarray(levels[..., 0] > 100).save(tmp_path / "mask.png")
+    assert np.array_equal(read_image(tmp_path / "a.png"), np.rot90(levels, -1))
+    assert np.array_equal(read_image(tmp_path / "la.png"), np.dstack([levels[..., 0]] * 3))
+    assert np.array_equal(read_image(tmp_path / "mask.png")[..., 1], np.where(levels[..., 0] > 100, 255, 0))
+
+
+@pytest.mark.parametrize(("values", "said"), [(np.full((40, 40), 1000, np.uint16), "a.tif: its values end at 1000 of the 65535"),
+                                              (np.full((40, 40), 0.5, np.float32), "a.tif: its values are float32, not grey")])
+def test_a_picture_whose_grey_levels_eight_bits_do_not_hold_is_refused(values, said, tmp_path):
+    tifffile.imwrite(tmp_path / "a.tif", values)
+    with pytest.raises(InputError, match=said):
+        read_image(tmp_path / "a.tif")
 
 
 def test_a_file_that_is_no_image_is_named(tmp_path):

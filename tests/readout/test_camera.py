@@ -191,7 +191,7 @@ def test_a_solid_of_the_same_motion_shows_nearly_the_same_image_and_markers(spec
     ({"shading": "no_such"}, "there is no such shading"),
     ({"axes": ["x", "-x"]}, "lie along one direction"),
     ({"distortion": [-9.0, 0, 0, 0, 0]}, "has no inverse in the image's corners"),
-    ({"background": "no_such.png"}, "there is no such image")])
+    ({"background": "no_such.png"}, "no_such.png: there is no such file")])
 def test_a_camera_that_does_not_fit_is_refused_in_one_sentence_when_the_sensor_is_loaded(tmp_path, change, sentence):
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump(gel_values(**change)))
     with pytest.raises(InputError, match=sentence) as refused:

@@ -7,6 +7,7 @@ around it that is centred on the centroid itself, so that no side is cut off ear
 tracking takes the nearest marker of the image at rest, within a limit.
 """
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from softtact.compiled import compiled
-from softtact.errors import InputError
-from softtact.inputs import check_input, check_limit, in_one_sentence
+from softtact.errors import FrameWarning, InputError
 
 LEAST_CONTRAST = 0.2      # the faintest of 99 markers on a real gel has 0.37 (docs/how-to/camera_of_a_gel.md)
 _RADII = np.geomspace(2.0, 20.0, 24)      # px, among which the markers' radius is searched
@@ -24,6 +24,9 @@ _WINDOW = 1.6             # radii of the circle of the centroid: a marker and it
 _APART = 1.3              # radii between two markers' middles at least
 _PASSES = 20              # of the centroid
 _WHOLE = 0.4              # share of a marker's area that must lie in the image
+_SMALLEST_SIDE = 17       # px of an image: more than eight of the smallest radii
+_COLOURS = {1: 1, 2: 1, 3: 3, 4: 3}     # by the number of channels, of which 2 and 4 end with alpha
+_DEEP, _LEAST_DEEP = 2**16 - 1, 2**12     # largest value of 16 bits, and the least that the largest value of such a picture has
 
 
 @dataclass(frozen=True)
@@ -41,14 +44,16 @@ class Markers:
 
 
 def grey_of(image: np.ndarray) -> np.ndarray:
-    """Grey values (rows, columns), 0 to 255, of an image of one or three channels."""
+    """Grey values (rows, columns), 0 to 255, of an image of one or three channels; a further one, alpha, is left out."""
     values = np.asarray(image, dtype=float)
-    if values.ndim == 3:
-        values = values[..., :3].mean(axis=2)
-    if values.ndim != 2 or min(values.shape, default=0) < 8:
+    channels = values.shape[2] if values.ndim == 3 else 1
+    if values.ndim not in (2, 3) or channels not in _COLOURS or min(values.shape[:2]) < _SMALLEST_SIDE:
         raise InputError(f"an image of shape {np.shape(image)} shows no markers; give (rows, columns) or (rows, columns, 3), "
-                         "8 pixels a side at least.")
-    return values
+                         f"{_SMALLEST_SIDE} pixels a side at least.")
+    if not np.isfinite(values).all():
+        first = tuple(map(int, np.argwhere(~np.isfinite(values))[0][:2]))
+        raise InputError(f"an image holds values that are not finite numbers, the first at row, column {first}; fill them in.")
+    return values[..., :_COLOURS[channels]].mean(axis=2) if values.ndim == 3 else values
 
 
 def find_markers(image: np.ndarray, *, radius_px: float | None = None, least_contrast: float = LEAST_CONTRAST) -> Markers:
@@ -59,6 +64,8 @@ def find_markers(image: np.ndarray, *, radius_px: float | None = None, least_con
     """
     grey = grey_of(image)
     radius = find_radius(grey) if radius_px is None else float(radius_px)
+    if not 1 <= radius <= 0.5 * min(grey.shape):
+        raise InputError(f"radius_px is {radius:g}; give that of a marker in px, from 1 to half of the image's shorter side.")
     dark = darkness(grey, radius)
     smooth = ndimage.gaussian_filter(dark, 0.5 * radius)
     high = ndimage.maximum_filter(smooth, size=2 * int(round(radius)) + 1) == smooth
@@ -121,13 +128,30 @@ def track(rest: np.ndarray, now: np.ndarray, *, limit_px: float) -> np.ndarray:
 
 
 def read_image(path: str | Path) -> np.ndarray:
-    """An image (rows, columns, 3) uint8 of a file. Raises InputError that names the file where it is none."""
-    from PIL import Image
+    """An image (rows, columns, 3) uint8 of a file, upright and without alpha; 16 bits become 8.
 
-    check_input(path, "picture", missing="there is no such image.")
-    with in_one_sentence(path, "not a readable image", "give a PNG, JPEG, BMP or TIFF file"), Image.open(path) as image:
-        check_limit(path, "pixels", image.width * image.height)
-        return np.asarray(image.convert("RGB"))
+    Raises InputError that names the file where it is none.
+    """
+    from softtact.imaging.reading import read_frame
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrameWarning)     # of values encoded for a screen: they are taken as they are stored
+        frame = read_frame(path)
+    colours = frame[..., None] if frame.ndim == 2 else frame[..., :_COLOURS[frame.shape[2]]]
+    return np.ascontiguousarray(np.broadcast_to(_eight_bits(colours, path), (*colours.shape[:2], 3)))
+
+
+def _eight_bits(values, path):
+    """Values of 1, 8 or 16 bits as uint8."""
+    if values.dtype == np.uint8:
+        return values
+    if values.dtype == np.bool_:
+        return np.where(values, 255, 0).astype(np.uint8)
+    if values.dtype.kind not in "ui" or not 0 <= values.min() <= values.max() <= _DEEP:
+        raise InputError(f"{path}: its values are {values.dtype}, not grey levels of 8 or 16 bits; convert it to PNG.")
+    if values.max() < _LEAST_DEEP:     # 10 or 12 bits stored in 16, of which 8 would leave a few levels
+        raise InputError(f"{path}: its values end at {values.max()} of the {_DEEP} that 16 bits hold; save it with 8 bits.")
+    return np.round(values / (_DEEP / 255)).astype(np.uint8)
 
 
 def _apart(px, height, least):

@@ -12,15 +12,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
-import imagecodecs
 import numpy as np
-import tifffile
 from PIL import ExifTags, Image, ImageOps
 
 from softtact.errors import FrameWarning, InputError, require
 from softtact.inputs import VARIABLE, check_input, limit
+
+if TYPE_CHECKING:
+    from tifffile import TiffFrame, TiffPage
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp")
 STACKS = (".tif", ".tiff")
@@ -157,6 +158,9 @@ def _is_deep(file, image):
 
 
 def _deep_png(file, image):
+    require("imagecodecs", file)
+    import imagecodecs
+
     return turned(imagecodecs.png_decode(file.read_bytes()), image.getexif().get(ExifTags.Base.Orientation, 1))
 
 
@@ -191,6 +195,9 @@ def tiff_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarra
 
     A function is to be called before the next pair is asked for.
     """
+    require("tifffile", file)
+    import tifffile
+
     with tifffile.TiffFile(file, _multifile=False) as stack:
         pages = [page for page in stack.pages if not _layout(page).is_reduced] or list(stack.pages)
         sizes = {(_layout(page).imagelength, _layout(page).imagewidth) for page in pages}
@@ -220,9 +227,9 @@ def _series(stack):
     return series
 
 
-def _layout(page: tifffile.TiffPage | tifffile.TiffFrame) -> tifffile.TiffPage:
+def _layout(page: "TiffPage | TiffFrame") -> "TiffPage":
     """The page that holds a page's tags: itself, or the key frame where tifffile skipped reading the tags of a long stack."""
-    return cast(tifffile.TiffPage, page.keyframe)
+    return cast("TiffPage", page.keyframe)
 
 
 def _frames_of(stack, page, series):
