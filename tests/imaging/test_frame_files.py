@@ -9,7 +9,7 @@ from PIL import Image
 
 from softtact.cli import main
 from softtact.errors import FrameWarning, InputError
-from softtact.imaging.reading import read_frames
+from softtact.imaging.reading import is_lossy, read_frames
 
 STACK = np.random.default_rng(0).integers(0, 1023, (5, 32, 48), dtype=np.uint16)
 TINY = (STACK >> 2).astype(np.uint8)
@@ -51,6 +51,13 @@ def test_the_series_of_a_file_follow_each_other_and_reduced_copies_are_no_frames
         file.write(STACK[:2, ::2, ::2], subfiletype=1, photometric="minisblack")
     frames = [frame for _, frame in frames_of(tmp_path / "series.tif")]
     assert [frame.dtype for frame in frames] == ["u1", "u1", "u2", "u2"] and np.array_equal(frames[3], STACK[1])
+
+
+@pytest.mark.parametrize(("name", "lossy"), [
+    ("frame_2024-01-01T12:00:00.jpg", True), ("frame_12:00:00.png", False), ("clip.mp4:00012", True), ("clip.MP4:123456", True),
+    ("12:00.avi:00003", True), ("stack.tif:00001", False)])
+def test_a_frame_is_known_as_compressed_by_the_ending_of_its_file_whatever_colons_its_name_has(name, lossy):
+    assert is_lossy(name) == lossy
 
 
 @pytest.mark.parametrize("orientation", TURNED)

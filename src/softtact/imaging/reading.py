@@ -7,6 +7,7 @@ reduced copies (thumbnails, pyramids) are skipped.
 
 import logging
 import math
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -58,7 +59,7 @@ def read_frames(path: str | Path, *, every: int = 1) -> Iterator[tuple[str, np.n
 
 def is_lossy(name: str) -> bool:
     """Whether a frame of this name (see `read_frames`) was compressed in a way that changes its values."""
-    return Path(name.partition(":")[0]).suffix.lower() in LOSSY
+    return Path(re.sub(r":\d{5,}$", "", name)).suffix.lower() in LOSSY
 
 
 def image_files(path: str | Path) -> list[Path]:
