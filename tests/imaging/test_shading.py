@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 
 from softtact.errors import InputError
 from softtact.imaging.ball_presses import BallPress, Gel, joined_samples, refined_circle
@@ -86,6 +87,25 @@ def test_numbers_edited_by_hand_are_noticed(tmp_path):
     file.write_text(file.read_text().replace("pixels: [64, 48]", "pixels: [64, 49]"))
     with pytest.raises(InputError, match="field 'digest': the numbers are not those that were written"):
         Shading.load(file)
+
+
+@pytest.mark.parametrize(("kind", "change", "said"), [
+    (PhongShading, {"azimuth_rad": [0.1, 0.2]}, r"azimuth_rad has numbers of shape \(2,\) in place of 3"),
+    (PhongShading, {"diffuse": [float("nan"), 1.0, 2.0]}, "diffuse holds nan"),
+    (PhongShading, {"exponent": [4.0, 0.0, 4.0]}, "exponent holds 0, which is not above 0"),
+    (PhongShading, {"pixels": [640]}, r"pixels has numbers of shape \(1,\) in place of 2"),
+    (PhongShading, {"pixels": [0, 480]}, "pixels holds 0, which is not above 0"),
+    (PhongShading, {"pixels": [64.5, 48]}, r"pixels are \[64.5, 48.0\], not whole numbers"),
+    (PhongShading, {"background_terms": [[1.0, 2.0, 3.0]] * 14}, "14 coefficients are those of no polynomial"),
+    (PhongShading, {"lamps": {"azimuth_rad": [0, 1, 2]}}, "missing 3 required positional arguments"),
+    (QuadraticShading, {"terms": [[[1.0, 2.0, 3.0]]] * 4}, "5 coefficients are those of no polynomial"),
+    (QuadraticShading, {"largest_tilt": [1.0, 2.0]}, r"largest_tilt has numbers of shape \(2,\) in place of a single one"),
+    (SlopeTable, {"table": [[[1.0, 2.0, 3.0]] * 2] * 3}, "table has not as many cells along y as along x")])
+def test_numbers_edited_by_hand_that_are_no_model_are_refused_with_their_field(kind, change, said, tmp_path):
+    values = fitted(kind, LIGHTS).values() | change
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(values))
+    with pytest.raises(InputError, match=f"mine.yaml: a field holds no such numbers .*{said}"):
+        Shading.load(tmp_path / "mine.yaml")
 
 
 def test_an_unknown_name_is_refused_with_those_that_ship():

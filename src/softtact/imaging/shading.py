@@ -171,7 +171,7 @@ class ShadedGrid:
 
 def _from_values(values, path):
     """The model of a file's content; raises InputError with the field and the remedy."""
-    if not isinstance(values, dict) or values.get("kind") not in KINDS:
+    if not isinstance(values, dict) or str(values.get("kind")) not in KINDS:
         raise InputError(f"{path}, field 'kind': it is none of {', '.join(KINDS)}; write it with `softtact calibrate-camera`.")
     provenance, stated = values.pop("provenance", {}), values.pop("digest", None)
     if stated is not None and stated != digest(values):
@@ -183,12 +183,34 @@ def _from_values(values, path):
         raise InputError(f"{path}, field {sorted(set(values) ^ wanted)[0]!r}: a shading of kind {kind.kind} has the fields "
                          f"{', '.join(sorted(wanted))}; write the file anew.")
     try:
-        arrays = {name: np.array(value, dtype=float) for name, value in values.items() if name != "pixels"}
+        arrays = {name: np.array(value, dtype=float) for name, value in values.items()}
+        _check(arrays)
         arrays = {name: value if value.ndim else value.item() for name, value in arrays.items()}
-        return kind(pixels=tuple(map(int, values["pixels"])), provenance=provenance,
+        return kind(pixels=tuple(map(int, arrays.pop("pixels"))), provenance=provenance,
                     lamps=None if lamps is None else Lamps.of(lamps), **arrays)
     except (TypeError, ValueError) as error:
         raise InputError(f"{path}: a field holds no such numbers ({error}); write the file anew.") from None
+
+
+def _check(arrays):
+    """Raise ValueError for numbers {field: array} that are no model: of another shape, not finite, or outside their range."""
+    for name, value in arrays.items():
+        wanted = _SHAPES[name]
+        if value.ndim != len(wanted) or any(size not in (None, found) for size, found in zip(wanted, value.shape, strict=True)):
+            sides = " x ".join("n" if size is None else str(size) for size in wanted) or "a single one"
+            raise ValueError(f"{name} has numbers of shape {value.shape} in place of {sides}")
+        if not np.isfinite(value).all():
+            raise ValueError(f"{name} holds {value[~np.isfinite(value)][0]:g}")
+    terms = arrays.get("terms", np.zeros((2, 1)))
+    for count in (len(arrays["background_terms"]), len(terms) + 1, terms.shape[1]):
+        _degree_of(count)
+    for name in ("pixels", "largest_tilt", "exponent"):
+        if name in arrays and (arrays[name] <= 0).any():
+            raise ValueError(f"{name} holds {arrays[name].min():g}, which is not above 0")
+    if (arrays["pixels"] % 1).any():
+        raise ValueError(f"pixels are {arrays['pixels'].tolist()}, not whole numbers")
+    if "table" in arrays and not 2 <= len(arrays["table"]) == arrays["table"].shape[1] == len(arrays["counts"]):
+        raise ValueError("table has not as many cells along y as along x, and as counts has")
 
 
 def _fields(kind):
@@ -320,6 +342,9 @@ class PhongShading(Shading):
 
 
 _LIGHT = ("azimuth_rad", "elevation_rad", "diffuse", "specular", "exponent")
+_SHAPES: dict[str, tuple[int | None, ...]] = {      # of the fields, None: any number
+    "pixels": (2,), "background_terms": (None, CHANNELS), "terms": (None, None, CHANNELS), "largest_tilt": (),
+    "table": (None, None, CHANNELS), "counts": (None, None), **dict.fromkeys(_LIGHT, (CHANNELS,))}
 KINDS = {one.kind: one for one in (QuadraticShading, SlopeTable, PhongShading)}
 
 
@@ -404,7 +429,7 @@ def _count(degree):
 def _degree_of(count):
     degree = int(round((np.sqrt(8 * count + 1) - 3) / 2))
     if _count(degree) != count:
-        raise InputError(f"{count} coefficients are those of no polynomial in two variables; write the shading anew.")
+        raise ValueError(f"{count} coefficients are those of no polynomial in two variables")
     return degree
 
 
