@@ -68,6 +68,22 @@ def test_a_folder_gives_one_table_and_a_picture_of_each_frame(folder, tmp_path, 
     assert iio.imread(pictures[1]).std() > 10
 
 
+def test_a_folder_of_pictures_is_made_with_those_above_it(folder, tmp_path, capsys, monkeypatch):
+    for picture in (tmp_path / "new/nested/pictures", "other/pictures"):
+        monkeypatch.chdir(tmp_path)
+        answer(capsys, folder, "--out", tmp_path / "discs.csv", "--pixel-mm", PIXEL_MM, "--picture", picture)
+        assert len(list((tmp_path / picture).iterdir())) == 3
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["discs.csv", "frames", "new", "other"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_frame_with_transparent_parts_is_warned_of_once(tmp_path, capsys):
+    grey = frame(0.2)
+    iio.imwrite(tmp_path / "a.png", np.dstack([np.full_like(grey, 255)] * 3 + [grey]))
+    summary = answer(capsys, tmp_path / "a.png", "--out", tmp_path / "d.csv", "--pixel-mm", PIXEL_MM)
+    assert [(names, "transparent" in sentence) for sentence, names in summary["warnings"].items()] == [(["a.png"], True)]
+
+
 def test_an_empty_frame_is_an_answer_and_not_an_error(folder, tmp_path, capsys):
     summary = answer(capsys, folder / "press_0.png", "--out", tmp_path / "none.csv", "--pixel-mm", PIXEL_MM)
     assert summary["frames"] == [{"frame": "press_0.png", "discs": 0, "mean_area_mm2": None, "total_area_mm2": 0.0, "clipped": 0,

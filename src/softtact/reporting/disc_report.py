@@ -33,7 +33,10 @@ _WIDEST = 9.0        # inches
 def draw_discs(frame: np.ndarray, table: "pd.DataFrame", outlines: Sequence[np.ndarray], path: str | Path, *, pixel_mm: float,
                title: str) -> None:
     """Write a PNG: the frame in mm and the outlines (list of (corners, 2) in mm), coloured by kind: whole, touching, clipped."""
-    light, plt = grey(frame), pyplot()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrameWarning)     # which the detection gave
+        light = grey(frame)
+    plt = pyplot()
     sides = np.array(light.shape)[::-1] * pixel_mm   # x, y
     inches = sides / sides.max() * _WIDEST
     figure, axes = plt.subplots(figsize=(inches[0] + 1.0, inches[1] + 1.0), layout="constrained")
@@ -194,12 +197,12 @@ def _pictures(target):
     if target is None:
         yield None
         return
-    with temporary_folder(target.parent) as folder:
+    with temporary_folder(next(one for one in target.parents if one.exists())) as folder:
         yield folder
         drawn = sorted(folder.iterdir())
         if target.suffix.lower() == ".png":
             os.replace(drawn[0], target_of(target))
             return
-        target.mkdir(exist_ok=True)
+        target.mkdir(parents=True, exist_ok=True)
         for file in drawn:
             shutil.move(file, target / file.name)
