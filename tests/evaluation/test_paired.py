@@ -70,6 +70,21 @@ def test_few_objects_are_undecided_whatever_they_show():
     assert compare([0.3]).p_above == 1.0
 
 
+@pytest.mark.parametrize("value", [0.1, 0.3, 1 / 3, 0.013, -0.7])
+def test_round_off_alone_tells_no_two_groups_and_no_mean_from_its_bound(value):
+    """Equal constants, whose means differ in the last digit by how many there are."""
+    for first, second in ((7, 11), (6, 13), (9, 10)):
+        found = compare_groups(np.full((first, 3), value), np.full((second, 3), value))
+        assert verdict(found.p_above, found.p_below, objects=6, least_objects=6) == UNDECIDED
+    rounded = compare(np.full((7, 3), value) * (1 + 1e-15 * np.arange(7)[:, None]), bound=value)
+    assert (rounded.p_above, rounded.p_below) == (1.0, 1.0)
+
+
+def test_groups_without_scatter_that_differ_are_told_apart():
+    found = compare_groups(np.full((7, 3), 0.1), np.full((11, 3), 0.1 - 1e-6))
+    assert verdict(found.p_above, found.p_below, objects=7, least_objects=6) == HOLDS
+
+
 def test_a_bound_below_zero_is_a_margin():
     """Worse by .002 of a scatter of .001, with a margin of .01: no worse than the margin, and worse than zero."""
     differences = -0.002 + 0.001 * np.random.default_rng(0).standard_normal(12)
@@ -97,6 +112,10 @@ def test_the_stated_power_is_how_often_the_effect_is_found():
 
 def test_without_an_effect_the_power_is_the_level():
     assert power(0.0, objects=12, seeds=5, object_sd=0.1, seed_sd=0.02, level=0.05) == pytest.approx(0.05)
+
+
+def test_without_any_spread_an_effect_is_found_for_certain():
+    assert [power(effect, objects=8, seeds=3, object_sd=0.0, seed_sd=0.0, level=0.025) for effect in (0.5, 0.0, -0.5)] == [1, 0, 0]
 
 
 def test_two_groups_have_the_power_of_students_test_of_two_samples():

@@ -16,10 +16,11 @@ import numpy as np
 from scipy import stats
 
 from softtact.evaluation.decisions import UNDECIDED
+from softtact.evaluation.percentiles import FEWEST, expanded_interval
 
 HOLDS, FAILS = "holds", "fails"
 DRAWS = 4000
-_FEWEST = 10      # draws on one side of a bound from which its share is read
+_ROUND_OFF = 1e-12     # of the largest value: a smaller difference is none
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,12 @@ def compare(differences: np.ndarray, *, bound: float = 0.0, level: float = 0.95,
     mean = float(table.mean())
     if objects < 2:
         return Comparison(mean, np.nan, np.nan, 1.0, 1.0, objects, seeds)
-    if np.ptp(table) == 0:
-        return Comparison(mean, mean, mean, float(mean <= bound), float(mean >= bound), objects, seeds)
+    least = _ROUND_OFF * max(np.abs(table).max(), abs(bound))
+    if np.ptp(table) <= least:
+        return _certain(mean, bound, (objects, seeds), least)
     freedom = _freedom([(_variance(table.mean(axis=1)), objects), (_variance(table.mean(axis=0)), seeds)])
-    return _compared(mean, bootstrap_means(_enlarged(table), draws=draws, seed=seed), bound, (objects, seeds), freedom, level)
+    means = bootstrap_means(_enlarged(table), draws=draws, seed=seed)
+    return _compared(mean, means, bound, (objects, seeds), freedom, level, least)
 
 
 def _enlarged(table):
@@ -78,17 +81,19 @@ def _freedom(parts):
     return whole**2 / sum(variance**2 / (count - 1) for variance, count in parts if count > 1) if whole > 0 else np.inf
 
 
-def _compared(mean, means, bound, counts, freedom, level):
-    """The `Comparison` of a mean whose bootstrap gave `means` (draws,), of counts (objects, seeds)."""
-    if np.ptp(means) == 0:
-        return Comparison(mean, mean, mean, float(mean <= bound), float(mean >= bound), *counts)
-    out = stats.t.ppf(0.5 * (1 + level), freedom)
-    tail = stats.norm.cdf(-out)
-    low, high = np.quantile(means, [tail, 1 - tail])
-    if tail * len(means) < _FEWEST:     # beyond the last draws as if the means were normal
-        low, high = means.mean() - out * means.std(), means.mean() + out * means.std()
+def _certain(mean, bound, counts, least):
+    """The `Comparison` of a mean without scatter, of counts (objects, seeds); it is the bound where they differ by `least`."""
+    off = mean - bound
+    return Comparison(mean, mean, mean, float(off <= least), float(off >= -least), *counts)
+
+
+def _compared(mean, means, bound, counts, freedom, level, least):
+    """The `Comparison` of a mean whose bootstrap gave `means` (draws,), of counts (objects, seeds); no scatter is below `least`."""
+    if np.ptp(means) <= least:
+        return _certain(mean, bound, counts, least)
+    low, high = expanded_interval(means, stats.t.ppf(0.5 * (1 + level), freedom))
     above, below = (_p_value(sign * (means - bound), freedom) for sign in (1, -1))
-    return Comparison(mean, float(low), float(high), above, below, *counts)
+    return Comparison(mean, low, high, above, below, *counts)
 
 
 def compare_groups(first: np.ndarray, second: np.ndarray, *, level: float = 0.95, draws: int = DRAWS, seed: int = 0) -> Comparison:
@@ -107,7 +112,8 @@ def compare_groups(first: np.ndarray, second: np.ndarray, *, level: float = 0.95
                   for table in tables)
     parts = [(_variance(table.mean(axis=1)), len(table)) for table in tables]
     of_seeds = tables[0].mean(axis=0) - tables[1].mean(axis=0)
-    return _compared(mean, one - other, 0.0, (objects, seeds), _freedom([*parts, (_variance(of_seeds), seeds)]), level)
+    least = _ROUND_OFF * max(np.abs(table).max() for table in tables)
+    return _compared(mean, one - other, 0.0, (objects, seeds), _freedom([*parts, (_variance(of_seeds), seeds)]), level, least)
 
 
 def bootstrap_means(table: np.ndarray, *, draws: int, seed: int) -> np.ndarray:
@@ -125,7 +131,7 @@ def _weights(rng, count, draws):
 def _p_value(means, freedom):
     """The level whose expanded percentile of the means (draws,) is 0; beyond the last draws as if the means were normal."""
     share = (means <= 0).mean()
-    quantile = stats.norm.ppf(share) if _FEWEST <= share * len(means) <= len(means) - _FEWEST else -means.mean() / means.std()
+    quantile = stats.norm.ppf(share) if FEWEST <= share * len(means) <= len(means) - FEWEST else -means.mean() / means.std()
     return float(stats.t.cdf(quantile, freedom))
 
 
@@ -168,11 +174,13 @@ def power(effect: float, *, objects: int | Sequence[int], seeds: int, object_sd:
 
     objects: their number, or those of two groups whose means are compared;  object_sd: standard deviation between objects
     seed_sd: of one training against another, the same for all objects; nothing where there is a single seed, of a formula
-    By the noncentral t distribution, with degrees of freedom as in `compare`.
+    By the noncentral t distribution, with degrees of freedom as in `compare`; without any spread 1 for an effect above 0, else 0.
     """
     sizes = np.atleast_1d(objects).tolist()
     if min(sizes) < 2:
         return 0.0
     parts = [(object_sd**2 / size, size) for size in sizes] + ([(seed_sd**2 / seeds, seeds)] if seeds > 1 else [])
     spread, freedom = np.sqrt(sum(variance for variance, _ in parts)), _freedom(parts)
+    if spread == 0:
+        return float(effect > 0)
     return float(stats.nct.sf(stats.t.isf(level, freedom), freedom, effect / spread))

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.special import ndtr, stdtrit
+from scipy.special import stdtrit
 
+from softtact.evaluation.percentiles import expanded_interval
 from softtact.learning.dataset import Samples, object_of
 from softtact.readout.ssim import map_ssim, mean_absolute_counts, others_mean, own_range_ssim
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
 LEVEL, REPEATS = 0.95, 2000
-_FEWEST = 10      # draws beyond a percentile from which it is read
 SHARE = 0.1             # of the reading's largest count, from which a taxel belongs to the contact patch
 FLOOR_COUNTS = 30.0     # least threshold: about four standard deviations of the virtual sensor's offsets and noise together
 TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
@@ -140,9 +140,7 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
                      level: float = LEVEL, repeats: int = REPEATS) -> tuple[float, float]:
     """(low, high) of the mean of `values` (n,), from percentiles over `repeats` draws; items, trials (n,) group the values.
 
-    With one item the scatter between items is unknown: (nan, nan). With few, plain percentiles are too narrow (by a third for
-    five), so they are expanded to the width of Student's interval of a normal sample (expanded percentiles, Hesterberg 2015); where
-    such a percentile lies beyond the draws, as of five items and fewer, it is Student's interval of their deviation.
+    With one item the scatter between items is unknown: (nan, nan). With few, percentiles are expanded (`expanded_interval`).
     """
     sums, counts, n_trials = by_trial(values, items, trials)     # (item, trial) each, and (item,)
     if len(n_trials) < 2:
@@ -153,13 +151,7 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
     taken = np.arange(sums.shape[1]) < n_trials[drawn, None]     # as many trials as the item has
     total, count = ((table[drawn[..., None], picks] * taken).sum(axis=(1, 2)) for table in (sums, counts))
     n = len(n_trials)
-    tail = ndtr(-np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.5 * (1 + level)))
-    means = total / count
-    if tail * repeats < _FEWEST:     # beyond the last draws as if the means were normal
-        half = np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.5 * (1 + level)) * means.std()
-        return float(means.mean() - half), float(means.mean() + half)
-    low, high = np.quantile(means, [tail, 1 - tail])
-    return float(low), float(high)
+    return expanded_interval(total / count, np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.5 * (1 + level)))
 
 
 def by_trial(values: np.ndarray, items: "np.ndarray | pd.Series",
