@@ -1,6 +1,7 @@
 """The detector of markers, on images drawn with known places, and on a real gel's picture where it is at hand."""
 
 import os
+import sys
 from pathlib import Path
 
 import imagecodecs
@@ -143,6 +144,19 @@ def test_a_picture_is_read_upright_without_alpha_and_as_it_is_stored(tmp_path):
     assert np.array_equal(read_image(tmp_path / "a.png"), np.rot90(levels, -1))
     assert np.array_equal(read_image(tmp_path / "la.png"), np.dstack([levels[..., 0]] * 3))
     assert np.array_equal(read_image(tmp_path / "mask.png")[..., 1], np.where(levels[..., 0] > 100, 255, 0))
+
+
+def test_a_picture_of_8_bits_needs_pillow_alone_and_others_name_what_they_need(tmp_path, monkeypatch):
+    levels = drawn(grid())
+    Image.fromarray(levels).save(tmp_path / "a.png")
+    Image.fromarray(levels).save(tmp_path / "a.tif")
+    (tmp_path / "deep.png").write_bytes(imagecodecs.png_encode(levels.astype(np.uint16) * 257))
+    for package in ("tifffile", "imagecodecs"):
+        monkeypatch.setitem(sys.modules, package, None)
+    assert np.array_equal(read_image(tmp_path / "a.png"), levels)
+    for name, package in (("a.tif", "tifffile"), ("deep.png", "imagecodecs")):
+        with pytest.raises(InputError, match=rf"{name}: This needs {package}, .*pip install 'softtact\[optics\]'"):
+            read_image(tmp_path / name)
 
 
 @pytest.mark.parametrize(("values", "said"), [(np.full((40, 40), 1000, np.uint16), "a.tif: its values end at 1000 of the 65535"),
