@@ -12,13 +12,13 @@ from softtact.cli import main
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.decks.solid import export_solid
+from softtact.decks.solid import deck_steps, export_solid
 from softtact.errors import InputError
 from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box, cylinder, in_tetrahedra
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.items import FacePressure
+from softtact.models.solid.items import FacePressure, Item
 from softtact.models.solid.path import SolidPath
 
 SIZE = (3.0, 3.0, 1.5)
@@ -83,12 +83,62 @@ def test_plane_rings_and_foams_are_written_as_what_they_are(tmp_path):
         assert deck.steps[0].loads == [(str(top), 2, -0.5)]
 
 
+def test_a_force_stays_while_its_object_slides_and_touch_comes_before_all_displacements():
+    """As `SolidPath` takes the same motion: a freedom that a step does not name keeps its load."""
+    plate = under_a_plate(rubber(), gap=0.2)
+    touch, pressed, slid = deck_steps(plate, {"plate": Motion().press(force_n=1.0).slide(x_mm=0.5)}, {})
+    assert touch.displacements == {(0, 0): 0.0, (0, 1): 0.0, (0, 2): pytest.approx(-0.21)} and touch.loads == {}
+    assert pressed.loads == slid.loads == {(0, 2): -1.0}
+    assert pressed.displacements == {(0, 0): 0.0, (0, 1): 0.0} and slid.displacements == {(0, 0): 0.5, (0, 1): 0.0}
+    aside = deck_steps(plate, {"plate": Motion().step(ways={"x": 1.0}, loads={"z": -1.0})}, {})
+    assert [step.displacements[0, 0] for step in aside] == [0.0, 1.0]
+    for ways in ({"z": 0.0}, {"x": 0.1, "z": -0.1}):
+        with pytest.raises(InputError, match="prescribed along z in step 3 from the position to which the force before moved it"):
+            deck_steps(plate, {"plate": Motion().press(force_n=1.0).slide(x_mm=0.5).step(ways=ways)}, {})
+
+
+def test_pressures_of_unknown_faces_and_faces_without_a_pressure_are_refused_by_decks_and_paths_alike():
+    body, motions = under_a_plate(rubber()), {"plate": Motion().step(ways={"z": -0.1})}
+    body.add(FacePressure(Surface.of(body.mesh.face("x0")), body.points, name="side"))
+    for pressures, told in [({"sied": [0.02]}, "There is no pressure 'sied'; there are side"),
+                            ({}, "'side' has no values; give one"), ({"side": [0.01, 0.02]}, "have 1 and 2 steps")]:
+        for made in (deck_steps, SolidPath):
+            with pytest.raises(InputError, match=told):
+                made(body, motions, pressures)
+
+
+def test_names_that_are_one_in_a_deck_are_refused(tmp_path):
+    mesh, laws = box((0, 0, 0), SIZE, (1, 1, 2)), {"Gel": rubber(), "gel": rubber()}
+    two = SolidBody(mesh.with_regions(lambda x: np.where(x[:, 2] < 1, "Gel", "gel")), laws, held={"z0": "xyz"},
+                    carried={"top": ((0, 0, 1.5), ["z1"], "z")})
+    frames = SolidBody(mesh, {"body": rubber()}, held={"z0": "xyz"},
+                       carried={"\u00e4": ((0, 0, 1.5), ["z1"], "z"), "\u00f6": ((0, 0, 1.5), ["x1"], "x")})
+    plate = np.array(trimesh.creation.box((5, 5, 1)).triangles) + [1.5, 1.5, 2.0]
+    rigid = SolidBody(box((0, 0, 0), SIZE, (1, 1, 1), region="object"), {"object": rubber()}, held={"z0": "xyz"},
+                      rigid={"object": ((1.5, 1.5, 2.0), plate)})
+    for body, names, one in ((two, "'Gel' and 'gel'", "GEL"), (frames, "'\u00e4' and '\u00f6'", "N_"),
+                             (rigid, "'object' and 'object'", "OBJECT")):
+        with pytest.raises(InputError, match=f"The names {names} of regions and frames are both {one} in a deck; rename one"):
+            export_solid(tmp_path / "press.inp", body, {body.frames[0].name: Motion().step(ways={"z": -0.1})}, dialect="abaqus")
+    assert not (tmp_path / "press.inp").exists()
+
+
+def test_an_item_that_no_deck_can_say_is_refused(tmp_path):
+    class Spring(Item):
+        """Anything but a pair or a pressure."""
+
+    body = under_a_plate(rubber())
+    body.add(Spring())
+    with pytest.raises(InputError, match="an item Spring, which decks do not take; leave it out"):
+        export_solid(tmp_path / "press.inp", body, {"plate": Motion().step(ways={"z": -0.1})}, dialect="calculix")
+
+
 @pytest.mark.slow
 def test_what_a_deck_cannot_say_is_refused_in_one_sentence(tmp_path):
     body = under_a_plate(rubber())
     for motion, dialect, told in [
         (Motion().step(ways={"rz": 5.0}), "calculix", "turns in step 1"),
-        (Motion().step(loads={"z": -1.0}).step(ways={"x": 0.1}), "calculix", "held along z in step 2"),
+        (Motion().step(loads={"z": -1.0}).step(ways={"z": -0.1}), "calculix", "prescribed along z in step 2 from the position"),
         (Motion().step(ways={"z": -0.1}), "ansys", "format 'ansys' is unknown"),
     ]:
         with pytest.raises(InputError, match=told):
@@ -132,6 +182,24 @@ def test_calculix_brings_a_loaded_plate_to_touch_and_to_where_it_bears_its_force
     ours = [-step.loads[0, 2] for step in SolidPath(body, {"plate": ways}).run()]
     print(f"ours {ours} at {places}")
     assert ours == pytest.approx(forces, rel=0.01)      # overlaps of 0.1 um in ways of 60 um, and of 1 um of ours
+
+
+@needs_ccx
+@pytest.mark.slow
+def test_calculix_slides_a_loaded_plate_as_we_do(tmp_path):
+    """Pressed by force, then moved aside under it. Expected: 3 % of the force along the plate (2 %: the stiffness of sticking), and
+    1 % of the depth under it, which the overlap of 1 um changes.
+    """
+    body = under_a_plate(rubber(6.0), divisions=(3, 3, 2), friction=0.5)
+    motion = Motion().press(force_n=0.5).slide(x_mm=0.06, steps=2)
+    export_solid(tmp_path / "press.inp", body, {"plate": motion}, dialect="calculix")
+    tables = run_ccx(tmp_path / "press.inp")
+    theirs = np.array([[*force[0, :2], place[0, 3]] for force, place in
+                       zip(tables.of("PLATE_NODES"), tables.of("PLATE_REFERENCE"), strict=True)][1:])
+    steps = list(SolidPath(body, {"plate": motion}).run())
+    ours = np.array([[*step.loads[0, :2], step.state.poses[0].translation[2]] for step in steps])
+    print(f"ours {ours}, CalculiX {theirs}")
+    assert ours[:, :2] == pytest.approx(theirs[:, :2], rel=0.03, abs=1e-3) and ours[:, 2] == pytest.approx(theirs[:, 2], rel=0.01)
 
 
 @needs_ccx

@@ -21,6 +21,7 @@ import numpy as np
 
 from softtact.contact.facet_shapes import LINE2, QUAD8
 from softtact.contact.motion import FREEDOMS, Motion, MotionStep
+from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.decks import keywords
 from softtact.decks.dialects import STIFF_MATERIAL, Dialect, contact_pair, dialect_of, linear_contact, tetrahedra_behind
@@ -29,6 +30,8 @@ from softtact.fem.elements import Element
 from softtact.files import atomic_path
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.frames import Frame
+from softtact.models.solid.items import FacePressure
+from softtact.models.solid.path import count_steps, still_loaded
 
 STIFFER = 50.0
 _ELASTIC_SLIP_MM = 1e-3
@@ -52,7 +55,8 @@ def export_solid(path: str | Path, body: SolidBody, motions: Mapping[str, Motion
     """Write a press of solids as a deck, whole or not at all; arguments as `SolidPath` takes them.
 
     Raises InputError for what a deck cannot express: an unknown dialect, a law that the program lacks, a frame that turns, a
-    freedom that is held after it was loaded, self-contact in CalculiX.
+    freedom that is prescribed after it was loaded, self-contact in CalculiX, items other than contact pairs and pressures, names
+    that are one in capitals.
     """
     lines = _Deck(body, dialect_of(dialect)).lines(deck_steps(body, motions or {}, pressures or {}), title)
     with atomic_path(path) as temporary:
@@ -60,35 +64,34 @@ def export_solid(path: str | Path, body: SolidBody, motions: Mapping[str, Motion
 
 
 def deck_steps(body: SolidBody, motions: Mapping[str, Motion], pressures: Mapping[str, Sequence[float]]) -> list[DeckStep]:
-    """The steps of a deck; displacements add up from rest."""
-    counts = {len(motion.steps) for motion in motions.values()} | {len(values) for values in pressures.values()}
-    names = [frame.name for frame in body.frames]
-    if unknown := [name for name in motions if name not in names]:
-        raise InputError(f"There is no frame {unknown[0]!r}; there are {', '.join(names) or 'none'}.")
-    if len(counts) != 1:
-        raise InputError(f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many.")
+    """The steps of a deck; displacements add up from rest, and loads stay until their freedom is prescribed, as in `SolidPath`."""
+    count, names = count_steps(body, motions, pressures), [frame.name for frame in body.frames]
     displacements = {(k, axis): 0.0 for k in range(len(names)) for axis in range(3)}
-    released: set[tuple[int, int]] = set()
+    loads: dict[tuple[int, int], float] = {}
+    steps: dict[str, MotionStep] = {}
     out = []
-    for number in range(counts.pop()):
-        loads: dict[tuple[int, int], float] = {}
-        for k, name in enumerate(names):
-            step = motions[name].steps[number] if name in motions else MotionStep()
+    for number in range(count):
+        steps = {name: still_loaded(steps.get(name), motion.steps[number]) for name, motion in motions.items()}
+        for name, step in steps.items():
             _refuse_turning(name, number, step)
-            loads |= {(k, FREEDOMS.index(freedom)): value for freedom, value in step.loads.items()}
-            for freedom, value in step.ways.items():
-                displacements[k, FREEDOMS.index(freedom)] += value
-        if held := released - loads.keys():
-            frame, axis = next(iter(held))
-            raise InputError(f"The frame {names[frame]!r} is held along {FREEDOMS[axis]} in step {number + 1} at the position to "
-                             "which the force before moved it, unknown to a deck; leave that step out, or continue to load it.")
-        released = set(loads)
+        ways = _by_axis(names, {name: step.ways for name, step in steps.items()})
+        if moved := loads.keys() & ways.keys():
+            frame, axis = min(moved)
+            raise InputError(f"The frame {names[frame]!r} is prescribed along {FREEDOMS[axis]} in step {number + 1} from the "
+                             "position to which the force before moved it, unknown to a deck; continue to load it, or end the "
+                             "motion before.")
+        loads = _by_axis(names, {name: step.loads for name, step in steps.items()})
         if number == 0 and (touch := _touch(body, loads)):
             out.append(DeckStep("TOUCH", displacements | touch, {}, [0.0] * len(body.pressures)))
-        values = [float(pressures[face.name][number]) if face.name in pressures else 0.0 for face in body.pressures]
+        displacements = {key: value + ways.get(key, 0.0) for key, value in displacements.items()}
         free = {key: value for key, value in displacements.items() if key not in loads}
-        out.append(DeckStep(f"STEP_{number + 1}", free, loads, values))
+        out.append(DeckStep(f"STEP_{number + 1}", free, loads, [float(pressures[face.name][number]) for face in body.pressures]))
     return out
+
+
+def _by_axis(names, values):
+    """{(frame, axis): value} of values {frame's name: {freedom: value}} of freedoms that do not turn."""
+    return {(names.index(name), FREEDOMS.index(freedom)): value for name, of in values.items() for freedom, value in of.items()}
 
 
 def _refuse_turning(name, number, step):
@@ -116,6 +119,8 @@ class _Deck:
 
     def __init__(self, body: SolidBody, writer: Dialect) -> None:
         self.body, self.writer = body, writer
+        _refuse_items(body)
+        _refuse_equal_names(body)
         self.parts = [part for part in body.mesh.parts() if len(part[2])]
         first = np.cumsum([1, *(len(nodes) for _, _, nodes in self.parts)])
         self.numbers = [np.arange(start, start + len(nodes)) for start, (_, _, nodes) in zip(first, self.parts, strict=False)]
@@ -273,6 +278,24 @@ class _Deck:
         tables = [line for name in names for line in (f"*NODE PRINT, NSET={name}_REFERENCE, FREQUENCY=1000", "U",
                                                       f"*NODE PRINT, NSET={name}_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF")]
         return [*tables, *fields, *(self.writer.contact_fields if self.body.pairs else ())]
+
+
+def _refuse_items(body):
+    if others := [item for item in body.items if not isinstance(item, (ContactPair, FacePressure))]:
+        raise InputError(f"The body has an item {type(others[0]).__name__}, which decks do not take; leave it out, or put a "
+                         "contact pair or a pressure in its place.")
+
+
+def _refuse_equal_names(body):
+    """Refuse regions and rigid objects, or frames, whose names are one in a deck: the second would take the place of the first."""
+    rigid = [frame.name for frame in body.frames if frame.nodes.min() >= len(body.mesh.points)]
+    for names in ([*body.mesh.regions, *rigid], [frame.name for frame in body.frames]):
+        first: dict[str, str] = {}
+        for name in names:
+            if name_of(name) in first:
+                raise InputError(f"The names {first[name_of(name)]!r} and {name!r} of regions and frames are both "
+                                 f"{name_of(name)} in a deck; rename one.")
+            first[name_of(name)] = name
 
 
 def _normals(points, facets):

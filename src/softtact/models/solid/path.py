@@ -66,16 +66,7 @@ class SolidPath:
     seconds: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        names, faces = [frame.name for frame in self.body.frames], [face.name for face in self.body.pressures]
-        for kind, given, known in (("frame", self.motions, names), ("pressure", self.pressures, faces)):
-            if unknown := [name for name in given if name not in known]:
-                raise InputError(f"There is no {kind} {unknown[0]!r}; there are {', '.join(known) or 'none'}.")
-        counts = {len(motion.steps) for motion in self.motions.values()} | {len(values) for values in self.pressures.values()}
-        if len(counts) != 1:
-            raise InputError(
-                f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many."
-            )
-        self.steps = counts.pop()
+        self.steps = count_steps(self.body, self.motions, self.pressures)
         self._times = self._ends()
 
     def _ends(self) -> np.ndarray | None:
@@ -100,7 +91,7 @@ class SolidPath:
         steps: dict[str, MotionStep] = {}
         for number in range(self.steps):
             began = time.perf_counter()
-            steps = {name: _still_loaded(steps.get(name), motion.steps[number]) for name, motion in self.motions.items()}
+            steps = {name: still_loaded(steps.get(name), motion.steps[number]) for name, motion in self.motions.items()}
             if not in_contact and any(step.loads for step in steps.values()):
                 state = self._at_first_contact(state, steps)
             in_contact = True
@@ -270,7 +261,24 @@ class _SlidOffError(ConvergenceError):
     """A loaded frame left what it pressed on."""
 
 
-def _still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
+def count_steps(body: SolidBody, motions: Mapping[str, Motion], pressures: Mapping[str, Sequence[float]]) -> int:
+    """How many steps motions and pressures of a body have, both by name. A frame without a motion stays where it is.
+
+    Raises InputError for names that the body does not have, a face without its pressures, and different numbers of steps.
+    """
+    names, faces = [frame.name for frame in body.frames], [face.name for face in body.pressures]
+    for kind, given, known in (("frame", motions, names), ("pressure", pressures, faces)):
+        if unknown := [name for name in given if name not in known]:
+            raise InputError(f"There is no {kind} {unknown[0]!r}; there are {', '.join(known) or 'none'}.")
+    if missing := [name for name in faces if name not in pressures]:
+        raise InputError(f"The pressure {missing[0]!r} has no values; give one in MPa for each step, 0 where it does not act.")
+    counts = {len(motion.steps) for motion in motions.values()} | {len(values) for values in pressures.values()}
+    if len(counts) != 1:
+        raise InputError(f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many.")
+    return counts.pop()
+
+
+def still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
     """A step with the loads of the one before on the freedoms that it does not name."""
     kept = {} if before is None else {name: load for name, load in before.loads.items() if name not in step.ways}
     return MotionStep(step.ways, kept | step.loads, step.seconds)
