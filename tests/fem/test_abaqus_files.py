@@ -138,6 +138,13 @@ def test_a_surface_of_a_set_without_sides_is_its_outside(read):
     assert len(body.mesh.faces["SKIN"]["triangle6"]) == 48
 
 
+def test_a_surface_on_an_element_that_the_deck_does_not_have_is_told(read):
+    body = read(PLAIN + "*SURFACE, NAME=FLOOR\n1, S1\n999, S1\n*SURFACE, NAME=LOST\n998, S2\n")
+    assert list(body.mesh.faces) == ["FLOOR"]
+    assert body.remarks == [f"the surface {name} is without element {number}, which is not among the elements that are read"
+                            for name, number in (("FLOOR", 999), ("LOST", 998))]
+
+
 def test_a_surface_of_the_assembly_names_sets_of_its_instances(read):
     nodes, hexes = hexahedra()
     part = inp_part("A", nodes, hexes).replace("*END PART", "*ELSET, ELSET=TOP, GENERATE, INTERNAL\n5, 8\n*END PART")

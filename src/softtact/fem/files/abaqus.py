@@ -116,6 +116,9 @@ class _Assembly:
             place = self._owner(key, owner or None)
             if name.isdigit():
                 flags = [(cells.numbers == int(name)) & (cells.instance == place) for cells in self.cells]
+                lost = f"the surface {surface.name} is without element {of}, which is not among the elements that are read"
+                if not any(chosen.any() for chosen in flags) and lost not in self.deck.remarks:
+                    self.deck.remarks.append(lost)
             elif name.upper() in self._sets_of(place):
                 flags = self._flags(place, name.upper())
             else:
