@@ -34,6 +34,45 @@ def test_a_written_mesh_is_read_back_with_regions_faces_and_geometry(tmp_path):
             assert np.array_equal(found.face_nodes(name), mesh.face_nodes(name))
 
 
+def test_names_with_signs_of_xml_are_written_and_read(tmp_path):
+    names = ["gel & skin", "gel <30A>", 'the "soft" one', "a&amp;b", "two\nlines"]
+    for name in names:
+        mesh = box((0, 0, 0), (1, 1, 1), (1, 1, 1), region=name).with_faces(**{name: lambda x: x[:, 2] > 0.9})
+        write_mesh(mesh, tmp_path / "body.vtu", {name: np.arange(27.0)})
+        found = read_mesh_file(tmp_path / "body.vtu")
+        assert found.regions == [name] and np.array_equal(found.face_nodes(name), mesh.face_nodes(name))
+        assert np.array_equal(meshio.read(tmp_path / "body.vtu").point_data[name], np.arange(27.0))
+
+
+def test_a_unit_a_geometry_or_a_thickness_that_is_not_that_of_the_file_is_refused(tmp_path):
+    for name, mesh in (("solid", box((0, 0, 0), (1, 2, 3), (1, 1, 1))), ("plane", box((0, 0), (1, 2), (1, 1), thickness_mm=5.0)),
+                       ("ring", box((0, 0), (1, 2), (1, 1), geometry="axisymmetric"))):
+        write_mesh(mesh, tmp_path / f"{name}.vtu")
+        again = {"unit": "mm", "geometry": mesh.geometry} | ({"thickness_mm": 5.0} if name == "plane" else {})
+        assert read_mesh_file(tmp_path / f"{name}.vtu", **again).volume_mm3() == pytest.approx(mesh.volume_mm3(), rel=1e-12)
+    for name, options, told in [
+        ("solid", {"unit": "m"}, "unit is given as m, and softtact wrote the file in mm; leave the unit out"),
+        ("solid", {"geometry": "axisymmetric"}, "given as axisymmetric, and that of the file is solid"),
+        ("solid", {"thickness_mm": 2.0}, "thickness of 2 mm has no effect on a mesh of the geometry 'solid'"),
+        ("plane", {"geometry": "axisymetric"}, "given as axisymetric, and that of the file is plane_strain"),
+        ("plane", {"thickness_mm": 2.0}, "thickness is given as 2 mm, and that of the file is 5 mm"),
+        ("ring", {"thickness_mm": 2.0}, "thickness of 2 mm has no effect on a mesh of the geometry 'axisymmetric'"),
+    ]:
+        with pytest.raises(InputError, match=rf"{name}.vtu: .*{told}"):
+            read_mesh_file(tmp_path / f"{name}.vtu", **options)
+
+
+def test_a_plane_mesh_needs_a_thickness_above_0_and_may_lie_beside_z_0_by_round_off(tmp_path):
+    square, noise = [("quad", np.arange(4)[None])], CUBE.copy()
+    noise[3, 2] = 1e-13
+    meshio.Mesh(noise, square).write(tmp_path / "square.vtu")
+    mesh = read_mesh_file(tmp_path / "square.vtu", unit="mm", geometry="plane_strain", thickness_mm=2.0)
+    assert mesh.volume_mm3() == pytest.approx(2.0) and not mesh.points[:, 2].any()
+    for thickness in (0.0, -2.0, np.nan, np.inf):
+        with pytest.raises(InputError, match=rf"square.vtu: The thickness of the body is {thickness:g} mm; give a positive"):
+            read_mesh_file(tmp_path / "square.vtu", unit="mm", geometry="plane_strain", thickness_mm=thickness)
+
+
 def test_linear_elements_of_every_kind_become_quadratic_ones_of_the_same_volume(tmp_path):
     wedges = np.array([[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]])
     for cells, kind in [([("tetra", TETRAHEDRA)], "tetra10"), ([("hexahedron", np.arange(8)[None])], "hexahedron27"),

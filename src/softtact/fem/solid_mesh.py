@@ -15,6 +15,7 @@ from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET10, TRI6
 GEOMETRIES = ("solid", "plane_strain", "axisymmetric")
 ELEMENTS = {element.meshio_name: element for element in (TET10, HEX20, HEX27, WEDGE18, TRI6, QUAD8, QUAD9)}
 _FLIPPED = {6: [0, 2, 1, 5, 4, 3], 8: [0, 3, 2, 1, 7, 6, 5, 4], 9: [0, 3, 2, 1, 7, 6, 5, 4, 8]}  # a facet seen from its other side
+_ROUND_OFF = 1e-6     # of the largest radius: how far beyond the axis a node may lie
 FACETS = {element.meshio_name: element for element in (LINE3, TRI6, QUAD8, QUAD9)}
 Facets = dict[str, np.ndarray]
 """{meshio's name of a facet: nodes (f, k)}, seen counter-clockwise from outside."""
@@ -49,6 +50,23 @@ class SolidMesh:
                 raise InputError(f"The region {region!r} has cells {kind!r}, which do not fit the geometry {self.geometry!r}.")
             if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(self.points)):
                 raise InputError(f"The region {region!r} has cells with nodes beyond the mesh's {len(self.points)}.")
+        if not 0 < self.thickness_mm < np.inf:
+            raise InputError(f"The thickness of the body is {self.thickness_mm:g} mm; give a positive number.")
+        self._check_places()
+
+    def _check_places(self):
+        """Refuse nodes of elements at no finite place, or beyond the axis of an axisymmetric body, x = 0."""
+        if np.isfinite(self.points).all() and not self.axisymmetric or not self.cells:
+            return
+        used = np.unique(np.concatenate([nodes.ravel() for _, _, nodes in self.cells]))
+        if (lost := ~np.isfinite(self.points[used]).all(axis=1)).any():
+            raise InputError(f"{lost.sum()} nodes of elements have a coordinate that is not a finite number (the first is node "
+                             f"{used[lost.argmax()]}); correct it.")
+        x = self.points[used, 0]
+        if self.axisymmetric and len(x) and x.min() < -_ROUND_OFF * np.abs(x).max():
+            place = ", ".join(f"{value:.4g}" for value in self.points[used[x.argmin()]])
+            raise InputError(f"{np.count_nonzero(x < 0)} nodes lie beyond the axis x = 0 (one at {place} mm); move the body, or "
+                             "leave out its half at x < 0.")
 
     @property
     def regions(self) -> list[str]:
@@ -112,19 +130,21 @@ class SolidMesh:
         return replace(self, points=np.ascontiguousarray(transform(self.points), dtype=float))
 
     def joined(self, other: "SolidMesh", *, prefix: str = "") -> "SolidMesh":
-        """Both meshes as one without merged nodes; `prefix` precedes the other's names of regions and faces."""
+        """Both meshes as one without merged nodes; `prefix` precedes the other's names of regions and faces.
+
+        Regions and faces of one name become one. With a prefix the other's whole surface is the face PREFIXboundary.
+        """
         if other.geometry != self.geometry:
             raise InputError(f"A mesh of the geometry {other.geometry!r} cannot join one of {self.geometry!r}.")
-        shift = len(self.points)
-        faces = {prefix + name: {kind: nodes + shift for kind, nodes in facets.items()} for name, facets in other.faces.items()}
-        faces[prefix + "boundary"] = {kind: nodes + shift for kind, nodes in other.boundary.items()}
+        if self.geometry == "plane_strain" and other.thickness_mm != self.thickness_mm:
+            raise InputError(f"A mesh of {other.thickness_mm:g} mm thickness cannot join one of {self.thickness_mm:g} mm; give "
+                             "both one thickness.")
+        shift, faces = len(self.points), dict(self.faces)
+        whole = {"boundary": other.boundary} if prefix else {}
+        for name, facets in (other.faces | whole).items():
+            faces[prefix + name] = _joined(faces.get(prefix + name, {}), {kind: nodes + shift for kind, nodes in facets.items()})
         cells = tuple((prefix + region, kind, nodes + shift) for region, kind, nodes in other.cells)
-        return replace(
-            self,
-            points=np.vstack([self.points, other.points]),
-            cells=self.cells + cells,
-            faces=self.faces | {name: face for name, face in faces.items() if name not in self.faces},
-        )
+        return replace(self, points=np.vstack([self.points, other.points]), cells=self.cells + cells, faces=faces)
 
     def volume_mm3(self) -> float:
         """Volume of all elements in mm3."""
@@ -139,6 +159,18 @@ class SolidMesh:
             return volumes
         radius = np.einsum("gm,em->eg", element.shape(rule.points)[0], self.points[nodes][..., 0])
         return volumes * (2 * np.pi * radius if self.axisymmetric else self.thickness_mm)
+
+
+def thickness_of(geometry: str, stated_mm: float | None) -> float:
+    """Thickness in mm of a body in a geometry: the stated one, else 1. Raises InputError where a stated one has no effect."""
+    if stated_mm is not None and geometry != "plane_strain":
+        raise InputError(f"The thickness of {stated_mm:g} mm has no effect on a mesh of the geometry {geometry!r}; leave it out.")
+    return 1.0 if stated_mm is None else stated_mm
+
+
+def _joined(one: Facets, other: Facets) -> Facets:
+    """The facets of both."""
+    return one | {kind: np.concatenate([one[kind], nodes]) if kind in one else nodes for kind, nodes in other.items()}
 
 
 def _boundary(cells):

@@ -8,9 +8,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.fem.elements import HEX27, QUAD9, TET10
-from softtact.fem.solid_mesh import Facets, SolidMesh
-
-_NEAR = 0.5     # of the layer's thickness: an existing level within this distance is moved to the new one, else one is inserted
+from softtact.fem.solid_mesh import Facets, SolidMesh, thickness_of
 
 
 def box(
@@ -20,16 +18,18 @@ def box(
     *,
     region: str = "body",
     grading: Sequence | None = None,
-    geometry: str = "plane_strain",
-    thickness_mm: float = 1.0,
+    geometry: str | None = None,
+    thickness_mm: float | None = None,
 ) -> SolidMesh:
     """A box (three numbers each) of HEX27, or a rectangle (two numbers each) of QUAD9, with faces x0, x1, y0, y1 (, z0, z1).
 
     low, high: opposite corners in mm;  divisions: elements along each side;  grading: for each side None, or the elements' ends as
-    rising shares from 0 to 1;  geometry, thickness_mm: of a rectangle, plane_strain or axisymmetric
+    rising shares from 0 to 1;  geometry, thickness_mm: of a rectangle, plane_strain (by default) or axisymmetric
+    Raises InputError for sizes, divisions and grading that make no box, and options that have no effect on it.
     """
     d = len(low)
-    lines = [_line(low[i], high[i], divisions[i], grading[i] if grading else None) for i in range(d)]
+    kind = geometry or ("solid" if d == 3 else "plane_strain")
+    lines = [_line("xyz"[i], low[i], high[i], divisions[i], grading[i] if grading else None) for i in range(d)]
     grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, d)
     sizes = [len(line) for line in lines]
     numbers = np.arange(len(grid)).reshape(sizes)
@@ -38,9 +38,7 @@ def box(
     first = np.stack(np.meshgrid(*[2 * np.arange(n) for n in divisions], indexing="ij"), axis=-1).reshape(-1, 1, d)
     cells = numbers[tuple(np.moveaxis(first + offsets, -1, 0))]
     points = np.column_stack([grid, np.zeros((len(grid), 3 - d))])
-    mesh = SolidMesh(
-        points, ((region, element.meshio_name, cells),), geometry="solid" if d == 3 else geometry, thickness_mm=thickness_mm
-    )
+    mesh = SolidMesh(points, ((region, element.meshio_name, cells),), geometry=kind, thickness_mm=thickness_of(kind, thickness_mm))
     tolerance = 1e-9 * max(h - l for l, h in zip(low, high, strict=True))
     rules = {}
     for i, axis in enumerate("xyz"[:d]):
@@ -49,9 +47,16 @@ def box(
     return mesh.with_faces(**rules)
 
 
-def _line(low, high, count, shares):
-    """Nodes of `count` quadratic elements between two places."""
-    ends = low + (high - low) * (np.linspace(0, 1, count + 1) if shares is None else np.asarray(shares, float))
+def _line(axis, low, high, count, shares):
+    """Nodes along an axis of `count` quadratic elements between two places."""
+    if not (low < high and np.isfinite([low, high]).all()):
+        raise InputError(f"A box cannot go from {low:g} to {high:g} mm along {axis}; give finite numbers, the lower one first.")
+    if not (count >= 1 and count == int(count)):
+        raise InputError(f"A box cannot have {count} divisions along {axis}; give a whole number from 1 on.")
+    shares = np.linspace(0, 1, count + 1) if shares is None else np.asarray(shares, float)
+    if len(shares) != count + 1 or not (np.diff(shares) > 0).all() or not np.allclose(shares[[0, -1]], [0, 1]):
+        raise InputError(f"The grading along {axis} does not fit {count} divisions; give {count + 1} rising shares from 0 to 1.")
+    ends = low + (high - low) * shares
     out = np.empty(2 * count + 1)
     out[::2], out[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
     return out
@@ -73,6 +78,8 @@ def cylinder(
 
     divisions: elements across the diameter and along the height;  grading: of the height, see `box`
     """
+    if not 0 < radius_mm < np.inf:
+        raise InputError(f"A cylinder cannot have the radius {radius_mm:g} mm; give a positive number.")
     mesh = box(
         (-1, -1, 0), (1, 1, height_mm), (divisions[0], divisions[0], divisions[1]), region=region, grading=(None, None, grading)
     )
@@ -132,7 +139,7 @@ def mirrored(mesh: SolidMesh, axis: int) -> SolidMesh:
 
 
 def with_level(levels: np.ndarray, level: float) -> np.ndarray:
-    """Rising levels (n,) in mm that contain `level`: the nearest inner level is moved to it, or it is inserted.
+    """Rising levels (n,) in mm that contain `level`: the nearest level is moved to it, or, where that is an end, it is inserted.
 
     Unchanged if `level` is not between the first and the last.
     """
@@ -141,7 +148,6 @@ def with_level(levels: np.ndarray, level: float) -> np.ndarray:
         return levels
     above = int(np.searchsorted(levels, level))
     nearest = above if levels[above] - level < level - levels[above - 1] else above - 1
-    inner = 0 < nearest < len(levels) - 1
-    if inner and abs(levels[nearest] - level) <= _NEAR * (levels[above] - levels[above - 1]):
+    if 0 < nearest < len(levels) - 1:
         return np.concatenate([levels[:nearest], [level], levels[nearest + 1:]])
     return np.insert(levels, above, level)

@@ -53,7 +53,8 @@ def _stack(design, layers):
     solid = design.model == "solid"
     if solid:
         low, high, divisions, grading = [*low, 0.0], [*high, g.depth], [*divisions, sizes.depth_layers], [*grading, None]
-    mesh = box(low, high, divisions, grading=grading, thickness_mm=g.depth).with_regions(lambda middles: _regions(design, middles))
+    mesh = box(low, high, divisions, grading=grading, thickness_mm=None if solid else g.depth)
+    mesh = mesh.with_regions(lambda middles: _regions(design, middles))
     faces = {f"{_LAYERS[layers[0]]} bottom": _at(1, y[0]), f"{_LAYERS[layers[-1]]} top": _at(1, y[-1])}
     if layers == [0]:     # loose: its stiff and soft parts have separate contact pairs
         top, (left, right) = _at(1, y[-1]), design.span("filler")

@@ -28,11 +28,10 @@ _FLAT = 1e-6             # volume of four points in a plane, over the cube of th
 
 
 def refuse_faulty(path: Path, mesh: SolidMesh) -> None:
-    """Refuse nodes beyond an axis, elements with a node twice, that repeat or are inverted, and neighbours that do not match.
+    """Refuse elements with a node twice, that repeat or are inverted, and neighbours that do not match.
 
     Raises InputError that says how many there are and where one is.
     """
-    _refuse_beyond_axis(path, mesh)
     _refuse_collapsed(path, mesh)
     _refuse_repeated(path, mesh)
     _refuse_inverted(path, mesh)
@@ -48,15 +47,6 @@ def _corners(kind, nodes):
 def _at(mesh, nodes):
     x, y, z = mesh.points[np.asarray(nodes)].mean(axis=0)
     return f"at {x:.4g}, {y:.4g}, {z:.4g} mm"
-
-
-def _refuse_beyond_axis(path, mesh):
-    """Refuse nodes beyond the axis of an axisymmetric body, x = 0."""
-    nodes = np.unique(np.concatenate([nodes.ravel() for _, _, nodes in mesh.cells]))
-    x = mesh.points[nodes, 0]
-    if mesh.geometry == "axisymmetric" and x.min() < -_ON * np.abs(x).max():
-        raise InputError(f"{path}: {np.count_nonzero(x < 0)} nodes lie beyond the axis x = 0 (one "
-                         f"{_at(mesh, nodes[[x.argmin()]])}); move the body, or leave out its half at x < 0.")
 
 
 def _refuse_collapsed(path, mesh):

@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from softtact.fem.files.checks import refuse_faulty, remarks_on_pieces
 from softtact.fem.files.gmsh import read_gmsh
 from softtact.fem.files.raw_mesh import FACET_CORNERS, RawMesh, corners_of
 from softtact.fem.quadratic_nodes import QUADRATIC, raised
-from softtact.fem.solid_mesh import ELEMENTS, SolidMesh
+from softtact.fem.solid_mesh import ELEMENTS, SolidMesh, thickness_of
 from softtact.files import atomic_path
 from softtact.geometry.meshes import UNIT_MM
 from softtact.inputs import check_input, check_limit
@@ -33,8 +34,10 @@ from softtact.inputs import check_input, check_limit
 _PACKED = re.compile(rb"<VTKFile[^>]* compressor=[^>]*>")
 _INLINE = re.compile(rb'<DataArray[^>]* format="binary"[^>]*>\s*([\w+/]{16,32})')
 _APPENDED = re.compile(rb'<DataArray[^>]* offset="(\d{1,15})"')
+_SIGNS = {'"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}     # beside &, < and >
 _TURNED_WEDGE = [3, 4, 5, 0, 1, 2]
 _FARTHEST_MM = 1e6
+_FLAT = 1e-6     # of its size: how far the nodes of a plane mesh may lie apart along z
 _TERM = re.compile(r"\s*([xyz])\s*([<>])\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
 
@@ -53,8 +56,14 @@ def write_mesh(mesh: SolidMesh, path: str | Path, point_data: Mapping[str, np.nd
     flags |= {FACE + name: [of_face[name][kind] if k >= elements and kind in of_face[name] else np.zeros(len(nodes), np.int8)
                              for k, (kind, nodes) in enumerate(blocks)] for name in mesh.faces}
     flags[GEOMETRY + mesh.geometry] = [np.full(len(nodes), mesh.thickness_mm) for _, nodes in blocks]
+    fields, flags = _escaped(point_data or {}), _escaped(flags)
     with atomic_path(path) as temporary:
-        meshio.Mesh(mesh.points, blocks, point_data=dict(point_data or {}), cell_data=flags).write(temporary, file_format="vtu")
+        meshio.Mesh(mesh.points, blocks, point_data=fields, cell_data=flags).write(temporary, file_format="vtu")
+
+
+def _escaped(fields):
+    """The fields with names that are attributes of XML, which meshio writes as they are."""
+    return {escape(name, _SIGNS): values for name, values in fields.items()}
 
 
 def _all_facets(mesh):
@@ -74,19 +83,20 @@ def _all_facets(mesh):
     return facets, flags
 
 
-def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str | None = None, thickness_mm: float = 1.0,
-                   faces: Mapping[str, str] | None = None, regions: Sequence[str] | None = None) -> SolidMesh:
+def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str | None = None,
+                   thickness_mm: float | None = None, faces: Mapping[str, str] | None = None,
+                   regions: Sequence[str] | None = None) -> SolidMesh:
     """The `SolidMesh` of a file: VTU written by `write_mesh`, or another format (Gmsh, Abaqus, VTK, MED, ...).
 
     unit: mm, cm, m, inch or in; required except for files of softtact, which are in mm
-    geometry, thickness_mm: plane_strain or axisymmetric, for a mesh in the plane z = 0 whose file does not state it
+    geometry, thickness_mm: plane_strain or axisymmetric, for a mesh in a plane z = const. whose file does not state it; 1 mm
     faces {name: rule}: further faces, see `face_rule`;  regions: the file's element sets or groups that are regions, if it has
         other sets too
 
     Warns (MeshWarning) of what is left out of the file of another program, and of pieces that are not joined.
     Raises InputError that names the file and the problem: unreadable file, unsupported element type, mixed linear and
     quadratic elements, inverted or repeated elements, neighbours whose faces do not match, an element in no region or in two, a
-    facet of a face inside the body.
+    facet of a face inside the body, a unit, a geometry or a thickness that is not that of the file.
     """
     body = read_body(path, unit=unit, geometry=geometry, thickness_mm=thickness_mm, faces=faces, regions=regions)
     for remark in body.remarks if not body.in_mm else ():
@@ -107,14 +117,17 @@ class BodyInFile:
     """Whether softtact wrote the file."""
 
 
-def read_body(path: str | Path, *, unit: str | None = None, geometry: str | None = None, thickness_mm: float = 1.0,
-              faces: Mapping[str, str] | None = None, regions: Sequence[str] | None = None) -> BodyInFile:
+def read_body(path: str | Path, *, unit: str | None = None, geometry: str | None = None,
+              thickness_mm: float | None = None, faces: Mapping[str, str] | None = None,
+              regions: Sequence[str] | None = None) -> BodyInFile:
     """As `read_mesh_file`, with what there is to say about the file in place of warnings."""
     path = Path(path)
     raw = _read(path)
     if unit is not None and unit not in UNIT_MM or unit is None and not raw.in_mm:
         stated = "no unit is stated, and the file has none" if unit is None else f"the unit {unit!r} is not known"
         raise InputError(f"{path}: {stated}; state one of {', '.join(UNIT_MM)}.")
+    if raw.in_mm and unit is not None and UNIT_MM[unit] != 1.0:
+        raise InputError(f"{path}: the unit is given as {unit}, and softtact wrote the file in mm; leave the unit out.")
     raw.points = raw.points * UNIT_MM[unit or "mm"]
     d = max(raw.dimensions, default=0)
     if d < 2:
@@ -125,10 +138,14 @@ def read_body(path: str | Path, *, unit: str | None = None, geometry: str | None
     named = _region_names(path, raw, regions)
     of_elements = [_regions_of(path, raw, {name: raw.regions[name][k] for name in named}, k) for k in elements]
     points, cells, number = _quadratic(path, raw.points, cells)
-    kind, thickness = _geometry(path, raw, geometry, thickness_mm, d, points)
+    kind, thickness = _geometry(path, raw, geometry, thickness_mm, d, points[np.concatenate([one.ravel() for _, one in cells])])
+    points = points if d == 3 else points * [1.0, 1.0, 0.0]
     parts = tuple((name, type_, nodes[region == name]) for (type_, nodes), region in zip(cells, of_elements, strict=True)
                   for name in dict.fromkeys(region))
-    mesh = SolidMesh(points, parts, geometry=kind, thickness_mm=thickness)
+    try:
+        mesh = SolidMesh(points, parts, geometry=kind, thickness_mm=thickness)
+    except InputError as error:     # the message does not name the file
+        raise InputError(f"{path}: {error}") from None
     refuse_faulty(path, mesh)
     named_faces, remarks = _faces(path, raw, mesh, number, d)
     mesh = SolidMesh(points, parts, named_faces, kind, thickness)
@@ -291,20 +308,33 @@ def _upright(points, wedges):
 
 
 def _geometry(path, raw, geometry, thickness_mm, d, points) -> tuple[str, float]:
-    if d == 3:
-        return "solid", 1.0
-    if raw.thickness_mm is not None:
-        return raw.geometry, raw.thickness_mm
-    if np.ptp(points[:, 2]) > 0:
+    """Geometry and thickness in mm of a mesh with its elements' nodes at points (n, 3), by the file and by the stated ones."""
+    stated = "solid" if d == 3 else raw.geometry if raw.thickness_mm is not None else None
+    if stated and geometry not in (None, stated):
+        raise InputError(f"{path}: the geometry is given as {geometry}, and that of the file is {stated}; leave it out.")
+    if stated == "plane_strain" and thickness_mm not in (None, raw.thickness_mm):
+        raise InputError(f"{path}: the thickness is given as {thickness_mm:g} mm, and that of the file is {raw.thickness_mm:g} mm; "
+                         "leave it out.")
+    kind = stated or _plane_geometry(path, raw, geometry, points)
+    try:
+        thickness = thickness_of(kind, thickness_mm)
+    except InputError as error:     # the message does not name the file
+        raise InputError(f"{path}: {error}") from None
+    return kind, raw.thickness_mm if stated == "plane_strain" else thickness
+
+
+def _plane_geometry(path, raw, geometry, points):
+    """plane_strain or axisymmetric, as stated, or by the names of the elements."""
+    if np.ptp(points[:, 2]) > _FLAT * np.ptp(points, axis=0).max():
         raise InputError(f"{path}: it holds a surface in space and no solid elements; mesh the body inside it, for example with "
                          "`softtact mesh`.")
     if geometry not in ("plane_strain", "axisymmetric"):
         if geometry is None and raw.geometry:
-            return raw.geometry, thickness_mm
+            return raw.geometry
         raise InputError(f"{path}: it is a plane mesh; state its geometry, plane_strain or axisymmetric.")
     if raw.geometry not in (None, geometry):
         raw.remarks.append(f"its elements are called {raw.geometry}, and are taken as {geometry}")
-    return geometry, thickness_mm
+    return geometry
 
 
 def face_rule(text: str) -> Callable[[np.ndarray], np.ndarray]:
