@@ -237,6 +237,17 @@ def test_a_body_that_fills_a_cavity_of_another_makes_it_whole(tmp_path):
     assert mended.mesh.volume == pytest.approx(9**3)
 
 
+@pytest.mark.parametrize(("side", "repairs", "volume"), [
+    (2.0, [], 9**3 - 4**3 + 2**3), (6.0, ["united 2 bodies that overlap or touch into 1"], 9**3)], ids=["free", "pressed in"])
+def test_a_body_in_a_cavity_stays_where_it_lies_free_and_fills_it_where_it_is_pressed_in(side, repairs, volume, tmp_path):
+    cavity = trimesh.creation.box((4, 4, 4))
+    cavity.invert()
+    parts = [trimesh.creation.box((9, 9, 9)), cavity, trimesh.creation.box((side, side, side))]
+    trimesh.util.concatenate(parts).export(tmp_path / "inner.stl")
+    mended = read_mended(tmp_path / "inner.stl", unit="mm")
+    assert mended.repairs == repairs and mended.mesh.volume == pytest.approx(volume)
+
+
 def test_a_cavity_stays_and_a_body_inside_out_is_turned(tmp_path):
     cavity, other = trimesh.creation.box((1, 1, 1)), trimesh.creation.box((2, 2, 2)).apply_translation([20, 0, 0])
     cavity.invert()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from manifold3d import Manifold, Mesh64
+from manifold3d import Manifold, Mesh64, OpType
 
 from softtact.errors import InputError, MissError
 from softtact.geometry.formats import STATED_MM, UNIT_MM, Facets, in_mm, read_facets
@@ -229,16 +229,13 @@ def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
     if mesh.body_count < 2:
         return
     pieces = mesh.split(only_watertight=False)
-    bodies = [piece for piece in pieces if volume_of(piece) > 0]
-    united = union_of(bodies)
-    total = sum(volume_of(body) for body in bodies)
-    if united is None or len(united.decompose()) != len(bodies) or total - united.volume() > OVERLAP * total:
+    bodies, outside = hollow_bodies(pieces)
+    if united_count(bodies) != len(bodies):
         raise InputError(f"{path}: its {len(bodies)} closed pieces overlap or touch; unite them into one body, for "
                          "example with trimesh.boolean.union or Blender's Boolean modifier.")
-    outside = sum(volume_of(piece) <= 0 and not is_cavity(piece, united) for piece in pieces)
     if outside:
-        raise InputError(f"{path}: {outside} of its {len(pieces)} closed pieces face inwards and are no cavities of the others; "
-                         "flip them, for example with 'Recalculate outside' of Blender.")
+        raise InputError(f"{path}: {len(outside)} of its {len(pieces)} closed pieces face inwards and are no cavities of the "
+                         "others; flip them, for example with 'Recalculate outside' of Blender.")
 
 
 def volume_of(mesh: trimesh.Trimesh) -> float:
@@ -255,7 +252,11 @@ def solid_of(mesh: trimesh.Trimesh, *, inverted: bool = False) -> Manifold:
 
 def union_of(meshes: Sequence[trimesh.Trimesh]) -> Manifold | None:
     """One `Manifold` of closed meshes, or None where one of them is not closed, or without meshes."""
-    solids = [solid_of(mesh) for mesh in meshes]
+    return union_of_solids([solid_of(mesh) for mesh in meshes])
+
+
+def union_of_solids(solids: Sequence[Manifold]) -> Manifold | None:
+    """One `Manifold` of several, or None where one of them is empty, or without any."""
     if not solids or any(solid.is_empty() for solid in solids):
         return None
     union = solids[0]
@@ -264,9 +265,36 @@ def union_of(meshes: Sequence[trimesh.Trimesh]) -> Manifold | None:
     return union
 
 
+def hollow_bodies(pieces: Sequence[trimesh.Trimesh]) -> tuple[list[Manifold], list[Manifold]]:
+    """`Manifold`s of the closed pieces that face outwards, each without its cavities, and of what others in none of them enclose.
+
+    A cavity is that of the smallest body around it, so that a body that lies free in a cavity stays. A single body keeps its
+    cavities: nothing can lie in them.
+    """
+    bodies = [solid_of(piece) for piece in pieces if volume_of(piece) > 0]
+    volumes, outside = [body.volume() for body in bodies], list[Manifold]()
+    hollows: list[list[Manifold]] = [[] for _ in bodies]
+    for piece in (piece for piece in pieces if volume_of(piece) <= 0):
+        cavity = solid_of(piece, inverted=True)
+        around = [k for k, body in enumerate(bodies) if _is_within(cavity, body)]
+        (hollows[min(around, key=lambda k: volumes[k])] if around else outside).append(cavity)
+    if len(bodies) > 1:
+        bodies = [Manifold.batch_boolean([body, *inner], OpType.Subtract) for body, inner in zip(bodies, hollows, strict=True)]
+    return bodies, outside
+
+
+def united_count(bodies: Sequence[Manifold]) -> int:
+    """How many bodies these are together: fewer than given where they touch, 0 where they overlap or one is not closed."""
+    united, total = union_of_solids(bodies), sum(body.volume() for body in bodies)
+    if united is None or total - united.volume() > OVERLAP * total:
+        return 0
+    return sum(part.volume() > 0 for part in united.decompose())     # a cavity is a part of negative volume
+
+
 def is_cavity(piece: trimesh.Trimesh, solid: Manifold) -> bool:
     """Whether a closed mesh that faces inwards lies within a `Manifold`."""
-    if solid is None:
-        return False
-    cavity = solid_of(piece, inverted=True)
+    return solid is not None and _is_within(solid_of(piece, inverted=True), solid)
+
+
+def _is_within(cavity, solid):
     return (solid ^ cavity).volume() > (1 - OVERLAP) * cavity.volume()

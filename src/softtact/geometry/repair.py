@@ -19,16 +19,17 @@ from softtact.errors import InputError
 from softtact.geometry.meshes import (
     MAX_SIZE_MM,
     MIN_SIZE_MM,
-    OVERLAP,
     check_body,
     folded,
+    hollow_bodies,
     is_cavity,
     load_sized,
     merge_facets,
     plausible_facets,
     refuse_folded,
-    solid_of,
     union_of,
+    union_of_solids,
+    united_count,
     volume_of,
 )
 from softtact.geometry.polygons import triangulated
@@ -308,18 +309,13 @@ def _unite(mesh, repairs):
     """Unite bodies that overlap or touch."""
     if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.body_count < 2:
         return mesh
-    pieces = list(mesh.split(only_watertight=False))
-    bodies = [piece for piece in pieces if volume_of(piece) > 0]
-    united = union_of(bodies)
-    if united is None:
+    bodies, outside = hollow_bodies(list(mesh.split(only_watertight=False)))
+    united = union_of_solids(bodies)
+    if united is None or united_count(bodies) == len(bodies):
         return mesh
-    total = sum(volume_of(body) for body in bodies)
-    count = len(united.decompose())
-    if count == len(bodies) and total - united.volume() <= OVERLAP * total:
-        return mesh
-    for piece in pieces:
-        if volume_of(piece) < 0:
-            united = united - solid_of(piece, inverted=True)
+    for cavity in outside:     # of several bodies together
+        united = united - cavity
+    count = united_count([united])
     repairs.append(f"united {numbered(len(bodies), 'body')} that overlap or touch into {count}")
     raw = united.to_mesh64()
     return merge_facets(raw.vert_properties[:, :3][raw.tri_verts])
