@@ -67,6 +67,19 @@ def test_moduli_that_contradict_each_other_are_told():
     assert list(fit_prony([good]).warnings) == []
 
 
+def test_shear_moduli_of_two_tests_that_differ_are_told_and_those_in_another_unit_are_refused():
+    tension = TimeTest("relaxation", TIMES, 3 * TRUTH.relaxation(TIMES)[None], "relaxation.csv", 1 / 3)
+
+    def both(factor):
+        return fit_prony([tension, TimeTest("frequency", HERTZ, factor * frequency(scale=1.0).values, "dma.csv", 1.0)], terms=3)
+
+    assert both(1.2).shear_modulus_mpa == pytest.approx(1.1, rel=1e-3) and list(both(1.2).warnings) == []
+    told, = both(2.0).warnings
+    assert "modulus of dma.csv (frequency), 2 MPa, is 2 times that of relaxation.csv (relaxation), 1 MPa; check" in told
+    with pytest.raises(InputError, match=r"of relaxation.csv \(relaxation\), 1 MPa, is 200 times that of dma.csv .* another unit"):
+        both(0.005)
+
+
 def test_a_modulus_that_relaxes_to_nothing_is_told():
     times = np.geomspace(0.01, 30, 60)
     fluid = TimeTest("relaxation", times, np.exp(-times / 2)[None], "gel.csv")
@@ -106,6 +119,8 @@ def test_a_sweep_is_read_in_any_order_of_frequencies(write_file, header, factor)
     ("relaxation", "t,force_n\n0,4\n1,3\n2,3\n3,2\n", "no column holds the time among t, force_n; name one of them time_s"),
     ("frequency", "frequency_hz,storage_modulus_mpa\n1,1\n2,2\n3,3\n4,4\n", "no column holds the loss modulus"),
     ("frequency", f"{SWEEP}1,1,1\n2,2,1\n3,3,1\n3,4,1\n", "row 5: the frequency 3 Hz comes twice"),
+    ("frequency", f"{SWEEP.replace(',s', ',shear_s')}1,1,1\n2,2,1\n3,3,1\n4,4,1\n",
+     "shear_storage_modulus_mpa and loss_modulus_mpa are of two tests"),
     ("frequency", f"{SWEEP}0,1,1\n2,2,1\n3,3,1\n4,4,1\n", "row 2: the frequency 0 Hz is not positive")])
 def test_a_test_over_time_that_cannot_be_is_refused(write_file, mode, content, sentence):
     with pytest.raises(InputError, match=sentence):

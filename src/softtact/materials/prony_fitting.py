@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from softtact.errors import InputError
+from softtact.materials.checks import MODULI_APART
 from softtact.materials.prony import INSTANTANEOUS, PronySeries
 from softtact.materials.time_tests import FREQUENCY, TimeTest
 from softtact.materials.uncertainty import corrected_aic, covariance_of, unseen
@@ -28,6 +29,7 @@ _PER_DECADE = 1.5       # terms; more follow noise
 _REACH = 10.0           # times may lie beyond the tested window by this factor
 _DENSE = 12             # times per decade that stand for a spectrum
 _LEAST_RELAXED = 1e-4   # share of the modulus that a solid keeps
+_APART = 1.5            # ratio of two tests' shear moduli from which that is said; specimens differ by some 10 to 20 %
 _INCONSISTENT = 0.1     # relative error of the best spectrum from which storage and loss modulus are said to disagree
 
 
@@ -54,7 +56,7 @@ class PronyFit:
     @property
     def shear_modulus_mpa(self) -> float | None:
         """Instantaneous shear modulus by the tests whose measure tells it; None without one."""
-        known = [scale * test.shear_over for scale, test in zip(self.scales, self.tests, strict=True) if test.shear_over]
+        known = [modulus for modulus, _ in _shear_moduli(self.tests, self.scales)]
         return float(np.mean(known)) if known else None
 
     @property
@@ -72,6 +74,8 @@ class PronyFit:
             yield "prony: the modulus relaxes to nothing within the tests, so the relaxed modulus is not known; test longer."
         for test in self.tests:
             yield from _disagreement(test)
+        if (apart := _apart(self.tests, self.scales)) and apart[0] > _APART:
+            yield f"prony: the {apart[1]}; check their units, temperatures and specimens."
 
     def entry(self) -> dict[str, Any]:
         """The card's block `prony`."""
@@ -90,6 +94,7 @@ def fit_prony(tests: Sequence[TimeTest], *, terms: int | None = None, moduli: st
     """The series that follows all tests best, with a number of terms that is stated, or found by the corrected Akaike criterion.
 
     moduli: which moduli the constants of the material's law are, for the record
+    Raises InputError for too many terms, and for tests whose shear moduli are as far apart as those in different units.
     """
     low, high = (pick(test.times_s[k] for test in tests) for k, pick in enumerate((min, max)))
     values = sum(test.values.size for test in tests)
@@ -191,8 +196,26 @@ def _report(tests, c, tau, scales, *, moduli, window, aicc, stated):
         deviation = np.sqrt(np.diag(covariance))[:2 * terms]
         loose = deviation > np.concatenate([series.g, np.ones(terms)])
         errors = {"g": deviation[:terms].tolist(), "tau_s": (deviation[terms:] * tau).tolist()}
+    if (apart := _apart(tests, total * scales)) and apart[0] > MODULI_APART:
+        raise InputError(f"The {apart[1]}: one of them is in another unit; name its columns with its unit.")
     return PronyFit(series, total * scales, float(np.sqrt(np.mean(error**2))), errors,
                     [name for name, bad in zip(names, loose, strict=True) if bad], window, aicc, stated, tuple(tests))
+
+
+def _shear_moduli(tests, scales):
+    """[(instantaneous shear modulus in MPa, source and mode)] of the tests whose measure tells it."""
+    return [(float(scale * test.shear_over), f"{test.source} ({test.mode})")
+            for scale, test in zip(scales, tests, strict=True) if test.shear_over]
+
+
+def _apart(tests, scales):
+    """(ratio of the largest shear modulus to the smallest, words on both); None for fewer than two tests that tell it."""
+    moduli = _shear_moduli(tests, scales)
+    if len(moduli) < 2:
+        return None
+    (low, soft), (high, stiff) = min(moduli), max(moduli)
+    return high / low, (f"instantaneous shear modulus of {stiff}, {high:.3g} MPa, is {high / low:.3g} times that of {soft}, "
+                        f"{low:.3g} MPa")
 
 
 def _disagreement(test):

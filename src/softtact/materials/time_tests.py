@@ -74,9 +74,17 @@ def _read(path, mode, columns, reading):
                        for row, cells in table.rows[units:]]).reshape(-1, len(found)).T
     if len(rows) < 4:
         raise InputError(f"{path}: {len(rows)} row(s) are too few for a test of {mode}; give at least four.")
+    _refuse_mixed(path, [column.name for column in found[1:]])
     remarks = tuple(f"{path}: {remark}" for remark in table.remarks)
     shear_over = next((factor for base, factor in SHEAR_OVER.items() if found[1].name.startswith(base)), None)
     return _checked(path, rows, TimeTest(mode, values[0], values[1:], Path(path).name, shear_over, remarks))
+
+
+def _refuse_mixed(path, names):
+    """Refuse the storage modulus of shear beside the loss modulus of tension, or the other way round."""
+    if len({name.startswith("shear_") for name in names}) > 1:
+        raise InputError(f"{path}: {names[0]} and {names[1]} are of two tests, one of shear and one of tension; give both moduli "
+                         "of one.")
 
 
 def _checked(path, rows, test):
