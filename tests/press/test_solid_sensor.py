@@ -13,6 +13,7 @@ from softtact.contact.motion import Motion
 from softtact.errors import InputError, TimeLimitError
 from softtact.fem.files.solids import write_mesh
 from softtact.fem.structured_meshes import box
+from softtact.materials.cards import write_card
 from softtact.materials.laws.registry import make_law
 from softtact.press.kinds import solid_at_rest
 from softtact.press.objects import distance_to_touch, first_direction
@@ -176,6 +177,17 @@ def test_a_card_on_the_command_line_takes_the_place_of_a_regions_law(folder, cap
     assert main(["press", str(folder / "plate.stl"), "--unit", "mm", "--sensor", str(folder / "named.yaml"), "--force", "0.1",
                  "--card", "foam=card.json"]) == 1
     assert "card.json" in capsys.readouterr().err
+
+
+def test_a_region_with_another_law_of_a_card_than_the_one_that_softens_is_refused(folder):
+    laws = {name: {"parameters": {"c10": 0.1} | more, "bulk_modulus_mpa": 4.0} for name, more in
+            (("neo_hooke", {}), ("mooney_rivlin", {"c01": 0.02}))}
+    effect = {"r": 2.0, "m_mpa": 0.05, "beta": 0.1, "law": "neo_hooke"}
+    card = {"material": "gel", "kind": "measured", "chosen": "neo_hooke", "laws": laws, "mullins": effect}
+    write_card(folder / "soft.json", card)
+    assert sensor_of(folder, "carded", regions={"rubber": {"card": "soft.json"}}).laws["rubber"].inelastic.mullins.r == 2.0
+    with pytest.raises(InputError, match="carded.yaml.* effect of its law 'neo_hooke', which is not that of 'mooney_rivlin'"):
+        sensor_of(folder, "carded", regions={"rubber": {"card": "soft.json", "law": "mooney_rivlin"}})
 
 
 @pytest.mark.parametrize(("changes", "message"), [

@@ -107,13 +107,20 @@ def inelastic_of(card: dict[str, Any]) -> Inelastic | None:
 
 
 def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
-    """The `Law` of a card: the chosen one, or the one named. It warns where it is used outside the card's strain window."""
+    """The `Law` of a card: the chosen one, or the one named. It warns where it is used outside the card's strain window.
+
+    Raises InputError for a law that the card does not have, and for another one than that whose softening (`mullins`) it states.
+    """
     name = law or card["chosen"]
     available = [key for key in card["laws"] if key != "linear"]
     if name not in available:
         raise InputError(
             f"The card of material {card['material']} has no hyperelastic law {name!r}; it has {', '.join(available)}."
         )
+    softened = (card.get("mullins") or {}).get("law", card["chosen"])
+    if card.get("mullins") and name != softened:
+        raise InputError(f"The card of material {card['material']} states the Mullins effect of its law {softened!r}, which is not "
+                         f"that of {name!r}; take {softened!r}, or fit the cycles again with {name!r} chosen.")
     try:
         made = law_of_entry(name, card["laws"][name])
     except InputError as error:     # of constants: the message does not name the card
