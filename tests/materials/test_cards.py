@@ -7,7 +7,7 @@ import pytest
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import read_json, write_json
-from softtact.materials.card_making import difference, make_card, partings, paths_inside, paths_outside
+from softtact.materials.card_making import difference, make_card, misfit_warnings, partings, paths_inside, paths_outside
 from softtact.materials.cards import law_from_card, linear_from_card, load_card, mullins_from_card, prony_from_card, write_card
 from softtact.materials.consistency import disagreements
 from softtact.materials.curves import Curve, VolumetricCurve, synthetic_curve
@@ -82,6 +82,30 @@ def test_the_volume_follows_from_the_stated_ratio_of_moduli(card):
 def test_another_law_than_the_chosen_one_can_be_taken(card):
     assert law_from_card(card).name == "mooney_rivlin"
     assert law_from_card(card, "yeoh").name == "yeoh"
+
+
+def test_another_law_than_the_softened_one_is_refused_and_one_without_softening_is_not(card):
+    effect = {"r": 2.0, "m_mpa": 0.05, "beta": 0.1}
+    for block in (effect, effect | {"law": "mooney_rivlin"}):     # without a name it is that of the chosen law
+        softened = card | {"mullins": block}
+        assert law_from_card(softened).inelastic.mullins == Mullins(2.0, 0.05, 0.1)
+        with pytest.raises(InputError, match="states the Mullins effect of its law 'mooney_rivlin', which is not that of 'yeoh'"):
+            law_from_card(softened, "yeoh")
+    relaxing = card | {"prony": {"g": [0.2], "tau_s": [3.0], "moduli": "relaxed"}}
+    assert law_from_card(relaxing, "yeoh").inelastic.prony.g == (0.2,)
+
+
+def test_a_misfit_that_is_no_number_is_told_as_a_large_one_is(card):
+    def told(error):
+        entry = card["laws"][card["chosen"]] | {"relative_error": error}
+        return misfit_warnings(card | {"laws": card["laws"] | {card["chosen"]: entry}})
+
+    assert told(0.25) == [] and len(told(0.26)) == len(told(float("nan"))) == 1
+
+
+def test_laws_of_a_card_that_are_none_are_refused(curves_of):
+    with pytest.raises(InputError, match=r"laws is \[\]; name one law at least"):
+        make_card(curves_of("neo_hooke", {"c10": 0.2}), laws=[])
 
 
 def test_a_law_that_the_card_lacks_is_refused_with_those_it_has(card):

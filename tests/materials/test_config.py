@@ -93,6 +93,8 @@ def test_a_wrong_key_or_value_is_refused_in_one_sentence(tmp_path, material_yaml
             r"curves.modes.uniaxial is \[1.6, 0.6\]; a window is \[from, to\]",
         ),
         (["fit", "laws"], ["gents"], "Law 'gents' is unknown"),
+        (["fit", "laws"], [], r"fit.laws is \[\]; name one law at least, or all of them"),
+        (["fit", "weights"], {"planar": float("inf")}, "fit.weights.planar is inf; input should be a finite number"),
         (["fit", "laws"], ["blatz_ko"], "Law 'blatz_ko' describes compressible foams, but a fit assumes"),
         (["fit", "choose"], "blatz_ko", "Law 'blatz_ko' describes compressible foams, but a fit assumes"),
         (["fit", "poisson"], 0.6, "fit.poisson is 0.6; input should be less than 0.5"),

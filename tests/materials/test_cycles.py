@@ -115,6 +115,23 @@ def test_only_rows_inside_the_window_fit_the_effect_but_those_beyond_it_soften()
         fit_mullins(LAW, [test], window={"uniaxial": (3.0, 4.0)})
 
 
+def test_a_law_that_ends_before_the_strains_of_the_test_is_refused():
+    gent = make_law("gent", {"mu": 0.4, "jm": 2.0})
+    test = softening_test(cycles_to(1.5, 2.8))
+    with pytest.raises(InputError, match="cycles.csv: the law gent does not exist at the stretch 2.* that the test reaches before"):
+        fit_mullins(gent, [test], window={"uniaxial": (1.0, 1.4)})
+
+
+def test_an_impossible_row_outside_of_first_loading_is_refused_too(write_file):
+    """A strain of -1.2 in the first unloading had ended first loading there."""
+    test = softening_test(cycles_to(1.5, 2.0, 2.8))
+    stretch, text = test.history.stretch.copy(), "engineering_strain,nominal_stress_mpa\n"
+    stretch[40] = -0.2
+    path = write_file(text + "".join(f"{x - 1:.8f},{y:.8f}\n" for x, y in zip(stretch, test.history.stress, strict=True)))
+    with pytest.raises(InputError, match="row 42: the stretch -0.2 is not positive"):
+        read_cycles([path], cycles="first")
+
+
 def test_first_loading_is_the_envelope_and_the_steady_curve_the_last_loading(write_file):
     test = softening_test(cycles_to(1.5, 2.0, 2.0))
     (first,), tests = read_cycles([written(write_file, test)], cycles="first")

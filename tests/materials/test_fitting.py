@@ -5,7 +5,7 @@ import pytest
 from table1 import TABLE_1
 
 from softtact.errors import InputError
-from softtact.materials.curves import synthetic_curve
+from softtact.materials.curves import make_curve, synthetic_curve
 from softtact.materials.fitting import collect, errors_of, fit_law, law_names, rms
 from softtact.materials.laws.registry import LAWS, make_law
 from softtact.materials.readers import read_curves
@@ -192,9 +192,27 @@ def test_options_without_meaning_are_refused(curves_of):
     for options, sentence in [
         ({"residual": "percent"}, "residual 'percent' is unknown; use one of absolute, relative"),
         ({"weights": {"planar": 0.0}}, "weight of the planar curve is 0; give a positive one"),
+        ({"weights": {"planar": np.inf}}, "weight of the planar curve is inf; give a positive one that is finite"),
+        ({"weights": {"planr": 4.0}}, "The weight of 'planr': there is no test mode 'planr'; did you mean 'planar'"),
+        ({"starts": 0}, "starts is 0; give a whole number from 1 on"),
+        ({"starts": 2.5}, "starts is 2.5; give a whole number from 1 on"),
+        ({"seed": -1}, "seed is -1; give a whole number from 0 on"),
     ]:
         with pytest.raises(InputError, match=sentence):
             fit_law("neo_hooke", curves_of("neo_hooke", {"c10": 0.2}), **options)
+
+
+def test_a_curve_without_stress_or_with_what_is_no_number_is_refused(curves_of):
+    good, stretch = curves_of("neo_hooke", {"c10": 0.2}), np.array([1.0, 1.1, 1.2])
+    for stress, sentence in ((np.zeros(3), "The stress of the planar curve .test.csv. is 0 throughout; leave the curve out"),
+                             (np.array([0.0, np.nan, 0.1]), "The planar curve .test.csv. has values that are not finite numbers")):
+        with pytest.raises(InputError, match=sentence):
+            fit_law("neo_hooke", [*good, make_curve("planar", stretch, stress, source="test.csv")])
+
+
+def test_a_synthetic_curve_beyond_its_law_is_refused():
+    with pytest.raises(InputError, match="The law gent does not exist at the stretch 2.* of a uniaxial curve; narrow its window"):
+        synthetic_curve(make_law("gent", {"mu": 0.3, "jm": 2.0}), "uniaxial", (1.0, 3.0), points=20, noise=0.01, seed=1)
 
 
 @pytest.mark.slow

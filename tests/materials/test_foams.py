@@ -8,6 +8,7 @@ from softtact.errors import InputError
 from softtact.fem.solid_block import HexBlock
 from softtact.fem.structured_meshes import box
 from softtact.materials.cards import law_of_entry
+from softtact.materials.curves import synthetic_curve
 from softtact.materials.fitting import fit_law
 from softtact.materials.laws.registry import FOAM_LAWS, make_law
 
@@ -87,6 +88,17 @@ def test_uniaxial_tests_have_their_closed_forms():
         assert law.nominal_stress("uniaxial", stretch) == pytest.approx(expected, rel=1e-9, abs=1e-12)
     foam = make_law("blatz_ko", {"mu": 0.05, "nu": 0.25, "f": 0.0})     # P = mu (l^-1/2 - l^-3) (Blatz and Ko 1962)
     assert foam.nominal_stress("uniaxial", stretch) == pytest.approx(0.05 * (stretch**-0.5 - stretch**-3.0), rel=1e-9, abs=1e-12)
+
+
+def test_a_volumetric_curve_of_a_foam_is_the_slope_of_its_energy():
+    for name, constants in CONSTANTS.items():
+        curve = synthetic_curve(make_law(name, constants), "volumetric", (0.6, 1.2), points=13, noise=0.0, seed=1)
+
+        def energy(J, name=name):
+            return printed_energy(name, np.cbrt(J)[:, None] ** 2 * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+
+        slope = (energy(curve.volume_ratio + 1e-6) - energy(curve.volume_ratio - 1e-6)) / 2e-6
+        assert curve.pressure == pytest.approx(-slope, rel=1e-6, abs=1e-9), name
 
 
 def test_simple_shear_of_the_foam_of_blatz_and_ko_has_no_stress_along_it():

@@ -266,6 +266,11 @@ def test_wrong_constants_are_refused_with_a_sentence():
             make_law(name, parameters)
 
 
+def test_constants_may_be_numbers_of_numpy():
+    assert make_law("neo_hooke", {"c10": np.float32(0.25)}).parameters == {"c10": 0.25}
+    assert make_law("gent", {"mu": 0.3, "jm": np.int64(20)}).parameters == {"mu": 0.3, "jm": 20.0}
+
+
 def test_a_negative_bulk_modulus_is_refused():
     with pytest.raises(InputError, match="bulk modulus -1 MPa; give a positive one"):
         make_law("neo_hooke", {"c10": 0.1}, bulk_modulus=-1.0)

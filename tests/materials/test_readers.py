@@ -6,6 +6,7 @@ import pytest
 from softtact.errors import InputError
 from softtact.materials.checks import refuse_mixed_units
 from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, refuse_idle, write_curve
+from softtact.materials.linear import bulk_modulus
 from softtact.materials.readers import read_curve, read_curves
 
 PLAIN = "stretch,nominal_stress_mpa\n0.8,-0.3\n1.0,0.0\n1.2,0.2\n"
@@ -90,6 +91,8 @@ def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_rem
         (HEADER + "0,1\n-0.3,1.2\n", "row 2: the stretch 0 is not positive; .* engineering_strain_percent.$"),  # nor swapped
         (HEADER + "1,0\n50,0.1\n", "row 3: the stretch 50 is above 25, .* name it engineering_strain_percent"),
         (HEADER + "1,0\n1.5,350\n", "row 3: the stress 350 MPa is beyond 200 MPa, .* nominal_stress_kpa"),
+        (HEADER + "1,0\n1.1,0\n1.2,0\n", "every stress is 0, as of a channel that was not recorded; name the right column"),
+        ("# mode: volumetric\nvolume_ratio,pressure_mpa\n1,0\n0.9,0\n", "every pressure is 0, as of a channel"),
         (HEADER + "0.7,0.47\n1,0\n", "row 2: the stress 0.47 MPa has the wrong sign .* compression negative"),
         (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
         (HEADER + "1,0\n0.9,-0.1\n1.1,0.1\n1.3,0.2\n", "row 3: the stretch turns back to 0.9; keep one loading branch"),
@@ -190,6 +193,12 @@ def test_a_volumetric_curve_reads_back(tmp_path):
     again = read_curve(tmp_path / "any.csv")
     assert (again.mode, again.kind, again.source) == ("volumetric", "synthetic", "a law, seed 1")
     assert np.array_equal(again.volume_ratio, curve.volume_ratio) and np.array_equal(again.pressure, curve.pressure)
+
+
+def test_a_written_volumetric_curve_keeps_the_bulk_modulus_of_a_hardly_compressed_rubber(tmp_path):
+    pressure = np.linspace(0, 0.01, 14)
+    write_curve(tmp_path / "any.csv", VolumetricCurve(1 - pressure / 2000, pressure))
+    assert bulk_modulus(read_curve(tmp_path / "any.csv"), bulk_over_shear=20).modulus_mpa == pytest.approx(2000, rel=1e-5)
 
 
 def test_a_path_can_state_its_own_mode(write_file):

@@ -77,6 +77,8 @@ class CardOptions:
             value = getattr(self, name)
             if value is not None and not low < value < high:
                 raise InputError(f"{name} is {value:g}; give a value above {low:.3g} and below {high:g}.")
+        if not self.laws:
+            raise InputError(f"laws is {self.laws!r}; name one law at least, or all of them (\"all\").")
 
     @property
     def fit(self) -> dict[str, Any]:
@@ -144,7 +146,7 @@ def card_of_modulus(shear_modulus_mpa: float, *, sources: Sequence[str], materia
 def misfit_warnings(card: dict[str, Any]) -> list[str]:
     """A sentence on a chosen law that misses its curves by more than `LARGEST_ERROR`, in a list that is empty otherwise."""
     error = card["laws"][card["chosen"]]["relative_error"]
-    if not error > LARGEST_ERROR:
+    if error <= LARGEST_ERROR:
         return []
     return [f"The chosen law, {card['chosen']}, misses these curves by {error:.0%} of the stress (root mean square), and above "
             f"{LARGEST_ERROR:.0%} a card does not describe them: check units, signs, preload and slack, narrow the window, or fit "

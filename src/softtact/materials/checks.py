@@ -17,13 +17,12 @@ from scipy.ndimage import median_filter
 from scipy.optimize import nnls
 
 from softtact.errors import InputError
-from softtact.materials.curves import VOLUMETRIC, AnyCurve
+from softtact.materials.curves import DEFORMATION, VOLUMETRIC, AnyCurve
 from softtact.materials.laws.base import SIMPLE_SHEAR, principal_stretches, rest_of, work_divisor
 
 # No elastomer exceeds these; larger values are percent or in another unit.
 LARGEST_STRETCH = 25.0
 LARGEST_SHEAR = 10.0
-DEFORMATION = {VOLUMETRIC: "volume ratio", SIMPLE_SHEAR: "shear strain"}     # of the other modes: stretch
 LARGEST_STRESS_MPA = 200.0
 LARGEST_PRESSURE_MPA = 2000.0
 # Stress may have the wrong sign by this share of the largest one (zero drift of a load cell) before it is refused.
@@ -54,13 +53,12 @@ _SLACK = 0.5                    # their ratio; in twelve published curves it is 
 
 def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray,
             compression: bool, window: Sequence[float] | None = None) -> tuple[str, ...]:
-    """Remarks (a tuple of sentences) on a curve; impossible data are refused.
+    """Remarks (a tuple of sentences) on a curve; data with a wrong sign or mixed units are refused, see also `refuse_impossible`.
 
     rows: (n,) numbers of the file's rows;  x, y: (n,) stretch and nominal stress, or volume ratio and pressure, in MPa
     raw: (2, n) the same two columns as in the file;  compression: whether the test is stated to be written without a minus
     window: [min, max] of x that will be used, for remarks are on these rows
     """
-    _check_magnitude(path, rows, x, y, mode, raw)
     _check_sign(path, rows, x, y, mode, raw, compression)
     _check_units_within(path, rows, x, y, mode)
     if window is not None:
@@ -165,7 +163,11 @@ def _swapped(raw, mode):
     return " (swapped, the columns would make sense: are they swapped?)" if plausible else ""
 
 
-def _check_magnitude(path, rows, x, y, mode, raw):
+def refuse_impossible(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray) -> None:
+    """Refuse stresses that are all 0, and the first row whose deformation or stress no elastomer has; arguments as of `checked`."""
+    if not y.any():
+        raise InputError(f"{path}: every {'pressure' if mode == VOLUMETRIC else 'stress'} is 0, as of a channel that was not "
+                         "recorded; name the right column, or leave the file out.")
     if mode == SIMPLE_SHEAR:
         refuse_first(path, rows, x, np.abs(x) > LARGEST_SHEAR,
                      f"the shear strain {{value}} is beyond {LARGEST_SHEAR:g}, which no elastomer bears; if the column holds "

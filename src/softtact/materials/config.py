@@ -36,6 +36,12 @@ def _positive(windows):
     return windows
 
 
+def _some(laws):
+    if not laws:
+        raise ValueError("name one law at least, or all of them")
+    return laws
+
+
 Window = Annotated[tuple[float, float], pydantic.AfterValidator(_rising)]
 Windows = Annotated[dict[Mode, Window], pydantic.AfterValidator(_positive)]
 
@@ -80,14 +86,15 @@ class MeasuredCurves(Section):
 class FitSettings(Section):
     """How the laws are fitted; see `softtact.materials.card_making.CardOptions`."""
 
-    laws: Literal["all"] | list[str] = "all"
+    laws: Annotated[Literal["all"] | list[str], pydantic.AfterValidator(_some)] = "all"
     choose: str = Field("best", description="law for the solvers, or best")
     bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0 without a volumetric curve; 2/3 is Poisson's ratio 0")
     poisson: float | None = Field(None, gt=-1, lt=0.5, description="of the linear constants; curves do not hold it")
     small_strain: float = Field(0.1, gt=0, lt=1, description="strain up to which E is the slope")
     window: Windows = Field(default_factory=dict, description="stretch to use, all by default")
     residual: Literal["absolute", "relative"] = Field("absolute", description="errors in MPa, or over the stress")
-    weights: dict[Mode, Annotated[float, Field(gt=0)]] = Field(default_factory=dict, description="of squared residuals, else 1")
+    weights: dict[Mode, Annotated[pydantic.FiniteFloat, Field(gt=0)]] = Field(
+        default_factory=dict, description="of squared residuals, else 1")
     nonnegative: bool = Field(False, description="keep constants in MPa from being negative")
     predict_left_out: bool = Field(True, description="fit also without each mode in turn, and predict it")
     disagreement: float = Field(0.2, gt=0, description="difference of two laws' stresses, as a share, that is named")

@@ -14,6 +14,7 @@ from softtact.unknown_names import unknown
 
 VOLUMETRIC = "volumetric"
 MODES = (*TEST_PATHS, SIMPLE_SHEAR, VOLUMETRIC)
+DEFORMATION = {VOLUMETRIC: "volume ratio", SIMPLE_SHEAR: "shear strain"}     # of the other modes: stretch
 
 
 class AnyCurve:
@@ -147,7 +148,11 @@ def synthetic_curve(law: Law, mode: str, window: tuple[float, float], *, points:
     seed: int or sequence of int for numpy's generator
     """
     x = np.linspace(*window, points)
-    stress = -law.volumetric.pressure(x - 1) if mode == VOLUMETRIC else law.nominal_stress(mode, x)
+    with np.errstate(all="ignore"):
+        stress = law.pressure(x) if mode == VOLUMETRIC else law.nominal_stress(mode, x)
+    if not np.isfinite(stress).all():
+        raise InputError(f"The law {law.name} does not exist at the {DEFORMATION.get(mode, 'stretch')} "
+                         f"{x[~np.isfinite(stress)][0]:.4g} of a {mode} curve; narrow its window.")
     error = noise * np.abs(stress).max() * np.random.default_rng(seed).standard_normal(points)
     values = ", ".join(f"{name} {value:g}" for name, value in law.parameters.items())
     volume = f"bulk modulus {law.bulk_modulus:g}" if mode == VOLUMETRIC else "incompressible"
@@ -160,7 +165,8 @@ def write_curve(path: str | Path, curve: AnyCurve) -> None:
     lines = [f"# mode: {curve.mode}", f"# kind: {curve.kind}", f"# source: {curve.source}"]
     lines += [f"# remark: {remark}" for remark in curve.remarks]
     lines.append(",".join(curve.columns))
-    lines += [f"{x:.6g},{y:.6g}" for x, y in zip(*curve.columns.values(), strict=True)]
+    digits = 12 if curve.mode == VOLUMETRIC else 6      # K follows from 1 - J, which is a few 1e-5 of a rubber at 0.1 MPa
+    lines += [f"{x:.{digits}g},{y:.6g}" for x, y in zip(*curve.columns.values(), strict=True)]
     with atomic_path(path) as temporary:
         Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -169,15 +175,20 @@ def refuse_idle(window: Mapping[str, Sequence[float]], weights: Mapping[str, flo
     """Refuse a window or a weight {mode: ...} that would change nothing in a fit to curves of these modes."""
     for name, what in (("window", window), ("weight", weights)):
         for mode in what:
-            if mode not in MODES:
-                fault = unknown(mode, MODES, kind="test mode")
-                raise InputError(f"The {name} of {mode!r}: {fault}{'' if fault.endswith('?') else '.'}")
+            refuse_unknown_mode(name, mode)
             if mode not in modes:
                 raise InputError(f"The {name} of {mode} has no effect, as there is no {mode} curve; leave it out.")
     if VOLUMETRIC in weights:
         raise InputError("The weight of volumetric has no effect, as K is fitted to that curve alone; leave it out.")
     if weights and len(set(modes) - {VOLUMETRIC}) == 1:
         raise InputError("The weight of the only mode has no effect; leave it out, or give a second test.")
+
+
+def refuse_unknown_mode(name: str, mode: str) -> None:
+    """Refuse a window or a weight, by its name, of what is no test mode."""
+    if mode not in MODES:
+        fault = unknown(mode, MODES, kind="test mode")
+        raise InputError(f"The {name} of {mode!r}: {fault}{'' if fault.endswith('?') else '.'}")
 
 
 def principal_window(windows: Mapping[str, Sequence[float]]) -> tuple[float, float] | None:

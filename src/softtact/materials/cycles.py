@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from softtact.errors import InputError
-from softtact.materials.curves import AnyCurve
+from softtact.materials.curves import DEFORMATION, AnyCurve
 from softtact.materials.history import first_loading, steady_loading
 from softtact.materials.laws.base import Law, principal_stretches
 from softtact.materials.mullins import Mullins
@@ -112,13 +112,20 @@ class Softened:
 
 
 def softened_rows(law: Law, test: CyclicTest, window: Sequence[float] | None = None) -> Softened:
-    """The rows of a test, inside a window [min, max] of its strain, that follow the Mullins effect of a law."""
+    """The rows of a test, inside a window [min, max] of its strain, that follow the Mullins effect of a law.
+
+    Raises InputError where the law has no energy at the strains before them.
+    """
     curve = test.history
     energy = energy_of(law, curve.mode, curve.deformation)
     low, high = window or curve.window
     later = ~test.first & (curve.deformation >= low) & (curve.deformation <= high)
-    return Softened(energy[later], np.maximum.accumulate(energy)[later], law.nominal_stress(curve.mode, curve.deformation[later]),
-                    curve.stress[later])
+    greatest = np.maximum.accumulate(energy)
+    if not np.isfinite(greatest[later]).all():
+        strain = f"{DEFORMATION.get(curve.mode, 'stretch')} {curve.deformation[~np.isfinite(energy)][0]:.4g}"
+        raise InputError(f"{curve.source}: the law {law.name} does not exist at the {strain} that the test reaches before these "
+                         "cycles; choose another law, or cut the test to the window.")
+    return Softened(energy[later], greatest[later], law.nominal_stress(curve.mode, curve.deformation[later]), curve.stress[later])
 
 
 def energy_of(law: Law, mode: str, deformation: np.ndarray) -> np.ndarray:

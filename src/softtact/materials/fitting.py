@@ -13,7 +13,7 @@ from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import qmc
 
 from softtact.errors import InputError
-from softtact.materials.curves import AnyCurve
+from softtact.materials.curves import AnyCurve, refuse_unknown_mode
 from softtact.materials.laws.base import Law, principal_stretches, work_divisor
 from softtact.materials.laws.registry import LAWS, law_class
 from softtact.materials.uncertainty import corrected_aic, correlation_of, covariance_of, unseen
@@ -47,8 +47,13 @@ class FitOptions:
         if self.residual not in RESIDUALS:
             raise InputError(f"The residual {self.residual!r} is unknown; use one of {', '.join(RESIDUALS)}.")
         for mode, weight in self.weights.items():
-            if not weight > 0:
-                raise InputError(f"The weight of the {mode} curve is {weight:g}; give a positive one, or leave the curve out.")
+            refuse_unknown_mode("weight", mode)
+            if not 0 < weight < np.inf:
+                raise InputError(f"The weight of the {mode} curve is {weight:g}; give a positive one that is finite, or leave the "
+                                 "curve out.")
+        for name, least in (("starts", 1), ("seed", 0)):
+            if not (value := getattr(self, name)) >= least or value != int(value):
+                raise InputError(f"{name} is {value}; give a whole number from {least} on.")
 
 
 @dataclass(frozen=True)
@@ -116,7 +121,9 @@ class Points:
 
 
 def collect(curves: Sequence[AnyCurve]) -> Points:
-    """`Points` of a list of curves."""
+    """`Points` of a list of curves. Raises InputError for one whose stress is 0 throughout, or not finite."""
+    for curve in curves:
+        _refuse_no_stress(curve)
     largest = [np.full(len(curve.stress), np.abs(curve.stress).max()) for curve in curves]
     stretches = [principal_stretches(curve.mode, curve.deformation) for curve in curves]
     return Points(
@@ -126,6 +133,15 @@ def collect(curves: Sequence[AnyCurve]) -> Points:
         divisor=np.concatenate([work_divisor(curve.mode, at) for curve, at in zip(curves, stretches, strict=True)]),
         floor=_RELATIVE_FLOOR * np.concatenate(largest),
     )
+
+
+def _refuse_no_stress(curve):
+    """Refuse a curve that no law can be fitted to."""
+    if not np.isfinite([curve.deformation, curve.stress]).all():
+        raise InputError(f"The {curve.mode} curve ({curve.source}) has values that are not finite numbers; leave these rows out.")
+    if not curve.stress.any():
+        raise InputError(f"The stress of the {curve.mode} curve ({curve.source}) is 0 throughout; leave the curve out, or widen "
+                         "its window.")
 
 
 def errors_of(law: Law, curves: Sequence[AnyCurve]) -> tuple[float, float]:

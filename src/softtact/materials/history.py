@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.checks import DEFORMATION, normal_noise, refuse_first
+from softtact.materials.checks import normal_noise, refuse_first
+from softtact.materials.curves import DEFORMATION
 from softtact.materials.laws.base import principal_stretches, rest_of
 
 HOLDS = INSTANTANEOUS, RELAXED = ("instantaneous", "relaxed")

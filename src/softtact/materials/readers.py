@@ -19,7 +19,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.inputs import refuse_twice
-from softtact.materials.checks import checked
+from softtact.materials.checks import checked, refuse_impossible
 from softtact.materials.columns import Specimen, find_columns, refuse_lacking
 from softtact.materials.curves import MODES, VOLUMETRIC, AnyCurve, make_curve
 from softtact.materials.cycles import CyclicTest
@@ -121,6 +121,7 @@ def _read_history(path, reading, cycles):
         raise InputError(f"{path}: the rows of cycles are in the order of time, and none is a hold; leave "
                          f"{'--sort' if reading.sort else '--holds'} out, or --cycles.")
     rows, values, raw = _values(table, reading, mode)
+    refuse_impossible(path, rows, *values, mode=mode, raw=raw)      # all rows: a wrong one hides which are of first loading
     test = CyclicTest(make_curve(mode, *values, kind=notes.get("kind", "measured"), source=Path(path).name))
     used = test.rows(cycles)
     remarks = checked(path, rows[used], *values[:, used], mode=mode, raw=raw[:, used], compression=reading.compression,
@@ -146,6 +147,7 @@ def _read(path, reading):
     notes = _notes(table)
     mode = _mode(path, reading.mode or ("uniaxial" if reading.layout == "soro_db" else None), notes)
     rows, values, raw = _values(table, reading, mode)
+    refuse_impossible(path, rows, *values, mode=mode, raw=raw)
     refuse_cycles(path, rows, values[0], mode=mode)     # first, as the stress of a turn is that of a short hold
     used = without_holds(path, rows, *values, mode=mode, holds=reading.holds)
     _check_count(path, used)

@@ -139,6 +139,10 @@ class Law:
         stress = self.principal_stress(stretches)
         return (stress[..., 0] - stress[..., 2]) / work_divisor(mode, stretches)
 
+    def pressure(self, volume_ratio: np.ndarray) -> np.ndarray:
+        """Pressure (n,) in MPa from all sides at the volume ratios J (n,): -dU/dJ, positive in compression."""
+        return -self.volumetric.pressure(np.asarray(volume_ratio, float) - 1)
+
     def _warn_outside(self, stretches):
         if self.stretch_window is None:
             return

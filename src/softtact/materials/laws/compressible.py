@@ -64,6 +64,11 @@ class CompressibleLaw(Law):
         self._warn_outside(stretches)
         return self.principal_stress(stretches)[..., 0] / np.asarray(stretch, float)
 
+    def pressure(self, volume_ratio: np.ndarray) -> np.ndarray:
+        """Pressure (n,) in MPa from all sides at the volume ratios J (n,): -t/J, all stretches J^(1/3)."""
+        J = np.asarray(volume_ratio, float)
+        return -self.principal_stress(np.cbrt(J)[:, None] * np.ones(3))[:, 0] / J
+
     def lateral_stretch(self, mode: str, stretch: float | np.ndarray) -> np.ndarray:
         """Stretch along the free direction in the same tests."""
         return np.array([self._stretches(mode, value)[2] for value in np.ravel(stretch)]).reshape(np.shape(stretch))

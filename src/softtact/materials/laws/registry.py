@@ -1,6 +1,7 @@
 """All laws by name. To add a law, add a file to this folder and its class to `LAWS`, or to `FOAM_LAWS` for a foam."""
 
 import math
+import numbers
 
 from softtact.errors import InputError
 from softtact.materials.laws.arruda_boyce import ArrudaBoyce
@@ -76,7 +77,7 @@ def _check(kind, parameters):
     if set(parameters) != set(expected):
         raise InputError(f"Law {kind.name} takes the constants {', '.join(expected)}, not {_listing(parameters)}.")
     for name, value in parameters.items():
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
+        if not isinstance(value, numbers.Real) or not math.isfinite(value):
             raise InputError(f"Law {kind.name}: constant {name} is {value!r}; give a finite number.")
         if name.startswith("alpha") and value == 0 or name in ("lambda_m", "jm") and value <= 0:
             raise InputError(
