@@ -77,6 +77,10 @@ class CrushedWarning(UserWarning):
     """A press by the hyperelastic model will compress frusta until their pockets are full."""
 
 
+class HardPressWarning(UserWarning):
+    """Increments of a press by the hyperelastic model find no balance again and again; it may take minutes, or end."""
+
+
 class FrameWarning(UserWarning):
     """A camera frame, or a mask, may not meet the assumptions of what reads it."""
 

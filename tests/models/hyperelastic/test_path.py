@@ -1,5 +1,6 @@
 """An object that moves on the hyperelastic sensor: down by depth or force, aside, and back."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,7 +13,7 @@ from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
-from softtact.errors import InputError
+from softtact.errors import HardPressWarning, InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.models.hyperelastic import newton, path
@@ -238,6 +239,24 @@ def test_the_way_to_the_shell_is_given_more_iterations_than_a_load_step(monkeypa
     by_force, to_shell = ({most for force, most in given if (force is None) == way} for way in (False, True))
     usual = NewtonSettings.draft().max_iterations
     assert by_force == {usual} and 65 < min(to_shell) == max(to_shell)
+
+
+@pytest.mark.parametrize(("failures", "told"), [(1, 0), (2, 1), (3, 1)])
+def test_a_press_whose_increments_find_no_balance_twice_tells_so_once_and_goes_on(monkeypatch, failures, told):
+    settled, left = path.settle, [failures]
+
+    def failing(body, surface, state, force, *given, **options):
+        found = settled(body, surface, state, force, *given, **options)
+        left[0] -= (fails := left[0] > 0)
+        return replace(found, state=None) if fails else found
+
+    monkeypatch.setattr(path, "settle", failing)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert pressed_ball(0.5).force_n == 0.5
+    texts = [str(one.message) for one in caught if one.category is HardPressWarning]
+    assert len(texts) == told
+    assert all("the load step of 0.5 N was not reached: from 0 N" in text and "may end there" in text for text in texts)
 
 
 @pytest.mark.parametrize(("friction", "rounds", "increment"), [(False, False, 0.15), (True, False, 0.05), (False, True, 0.05)])

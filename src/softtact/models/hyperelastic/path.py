@@ -4,6 +4,7 @@ A stage of the path leads from one load step to the next along a coordinate: the
 the motion's step. An increment that does not converge is halved, one that does is doubled.
 """
 
+import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 
 from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
-from softtact.errors import ConvergenceError, InputError, TimeLimitError
+from softtact.errors import ConvergenceError, HardPressWarning, InputError, TimeLimitError
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.newton import (
     DEEP,
@@ -32,6 +33,7 @@ _CLEAR_MM = 0.1        # height over the surface from which no contact acts
 # the contact is so stiff that what a step's limit leaves of an increment would tear the cover out of its balance, with 3,000 N.
 _LONGER_WITHOUT_FRICTION = 3.0
 _PATIENCE = 4          # factor of the iterations on that way: a cover that slips off an edge took 65 of the largest length
+_HARD = 2              # increments of a load step without a balance, not for folds, from which on it is told
 _SMALLEST_SHARE = 1 / 64     # of the largest displacement in an increment; below it a motion's step fails
 
 
@@ -93,9 +95,12 @@ class ByForce:
         """Whether the object already presses at an increment's start; a first touch does not count."""
         return start > 0
 
-    def failure(self, start: float, coordinate: float) -> str:
-        return (f"The load step of {self.end:g} N was not reached: from {start:.4g} N on no step towards {coordinate:.4g} N found "
-                "a balance")
+    @property
+    def target(self) -> str:
+        return f"The load step of {self.end:g} N was not reached"
+
+    def since(self, start: float, coordinate: float) -> str:
+        return f"from {start:.4g} N on no step towards {coordinate:.4g} N found a balance"
 
     remedy = "Ask for smaller forces or for load steps nearer to each other"
 
@@ -148,8 +153,12 @@ class ByMotion:
         before, after = self.control(start).force, self.control(coordinate).force
         return after / before if before and after else 1.0
 
-    def failure(self, start: float, coordinate: float) -> str:
-        return f"Step {self.number} of the motion was not reached: from {start:.0%} of it on no increment found a balance"
+    @property
+    def target(self) -> str:
+        return f"Step {self.number} of the motion was not reached"
+
+    def since(self, start: float, coordinate: float) -> str:
+        return f"from {start:.0%} of it on no increment found a balance"
 
     remedy = "Make the step's displacement or load smaller"
 
@@ -163,9 +172,12 @@ class ToStop(ByMotion):
         short = body.friction.active or body.slab.top.rounds_edges
         return start + self.at_once * (1.0 if short else _LONGER_WITHOUT_FRICTION)
 
-    def failure(self, start: float, coordinate: float) -> str:
-        return (f"The object did not reach the shell on which it rests, {self.after.indentation:.3g} mm below its pose: "
-                f"from {start:.0%} of that on no increment found a balance")
+    @property
+    def target(self) -> str:
+        return f"The object did not reach the shell on which it rests, {self.after.indentation:.3g} mm below its pose"
+
+    def since(self, start: float, coordinate: float) -> str:
+        return f"from {start:.0%} of that on no increment found a balance"
 
 
 class _BelowShell(ConvergenceError):
@@ -325,7 +337,7 @@ def _in_increments(body, surface, state, reached, stage, settings, *, between=Fa
     iterations or more, since the Newton step is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
     One that folds the cover, whether it converges or not, is repeated with a cover that resists, as in all increments after it.
     """
-    iterations, counted, increment, settled = 0, 0, stage.end - reached, body.has_points_of(state) and not between
+    iterations, counted, in_vain, increment, settled = 0, 0, 0, stage.end - reached, body.has_points_of(state) and not between
     if not settled:      # an earlier stage from this state folded the cover
         state = _resisting(body, surface, state, between=between)
     while True:
@@ -357,6 +369,12 @@ def _in_increments(body, surface, state, reached, stage, settings, *, between=Fa
             raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))
         if found.state is not None:
             reached, state, settled = at, found.state, True
+            continue
+        in_vain += 1
+        if in_vain == _HARD:
+            why = _failure(body, state, stage, reached, at, found.residual_n, iterations)
+            warnings.warn(f"So far {why[0].lower()}{why[1:]} The press goes on in smaller increments, which may take minutes, and "
+                          "may end there.", HardPressWarning, stacklevel=2)
 
 
 def _resisting(body, surface, state, *, between=False):
@@ -384,5 +402,5 @@ def _failure(body, state, stage, reached, at, residual, iterations):
     remedy = stage.remedy
     if share > DEEP:
         remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
-    return (f"{stage.failure(reached, at)} (unbalanced force {residual:.2g} N, {iterations} iterations in all); "
+    return (f"{stage.target}: {stage.since(reached, at)} (unbalanced force {residual:.2g} N, {iterations} iterations in all); "
             f"{most_compressed}. {remedy}.")
