@@ -69,3 +69,32 @@ def test_steps_that_are_no_motion_are_refused_in_one_sentence():
         with pytest.raises(InputError, match=sentence) as caught:
             make()
         assert "\n" not in str(caught.value), make
+
+
+@pytest.mark.parametrize(("make", "sentence"), [
+    (lambda: Motion.parse("x 1 in 00"), "the step 'x 1 in 00' is not understood"),
+    (lambda: Motion.parse(5), "5 is no text; write steps like"),
+    (lambda: Motion().press(force_n=[]), "Motion.press: force_n is empty; give at least one number"),
+    (lambda: Motion().press(depth_mm=[], over_s=1.0), "depth_mm is empty; give at least one number"),
+    (lambda: Motion().press(force_n="5 N"), "force_n='5 N' is no number; give a finite one"),
+    (lambda: Motion().press(force_n=[[5, 20]]), r"force_n=\[5, 20\] is no number"),
+    (lambda: Motion().press(force_n=[[5], [5, 20]]), r"force_n=\[5\] is no number"),
+    (lambda: Motion().slide(x_mm="1"), "x_mm='1' is no number"),
+    (lambda: Motion().slide(x_mm=1, steps=float("nan")), "steps=nan is not possible; give a whole number from 1 on"),
+    (lambda: Motion().slide(x_mm=1, steps="2"), "steps=2 is not possible"),
+    (lambda: Motion().hold("long"), "over_s='long' is no number"),
+    (lambda: Motion().step(ways={"x": None}), "x=None is no number"),
+    (lambda: Motion().step(ways={"x": "1"}), "x='1' is no number"),
+    (lambda: MotionStep(ways=None), "ways=None names no freedoms; give a dictionary"),
+    (lambda: MotionStep(ways={"z": float("nan")}), "z=nan is no number; give a finite one"),
+    (lambda: MotionStep(loads={"w": 1.0}), "the freedom 'w' is unknown"),
+    (lambda: MotionStep(seconds=0.0), "a duration of 0 s is not possible"),
+])
+def test_what_is_no_number_no_count_and_no_freedom_is_refused_in_one_sentence(make, sentence):
+    with pytest.raises(InputError, match=sentence):
+        make()
+
+
+def test_numbers_of_any_library_are_numbers():
+    for force in (np.float32(5), np.array(5), np.array([5]), [np.int64(5)], (5,), iter([5])):
+        assert Motion().press(force_n=force).forces_n == [5.0]

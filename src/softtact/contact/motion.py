@@ -16,8 +16,10 @@ Steps without durations are slow: a material that relaxes has relaxed at the end
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +46,18 @@ class MotionStep:
     seconds: float | None = None
     """How long it takes; None: so long that a material that relaxes has relaxed at its end."""
 
+    def __post_init__(self) -> None:
+        for kind, values in (("ways", self.ways), ("loads", self.loads)):
+            if not isinstance(values, Mapping):
+                raise InputError(f"Motion: {kind}={values!r} names no freedoms; give a dictionary, such as {{'z': -0.5}}.")
+        for name, value in (*self.ways.items(), *self.loads.items()):
+            if name not in FREEDOMS:
+                raise InputError(f"Motion: the freedom {name!r} is unknown; use one of {', '.join(FREEDOMS)}.")
+            _finite(name, value)
+        if both := set(self.ways) & set(self.loads):
+            raise InputError(f"Motion: the freedom {both.pop()!r} is prescribed and loaded in one step; choose one.")
+        _share("step", self.seconds, 1)
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -62,7 +76,7 @@ class Motion:
         if (force_n is None) == (depth_mm is None):
             raise InputError("Motion.press takes either force_n or depth_mm; give one of them.")
         name, given = ("force_n", force_n) if depth_mm is None else ("depth_mm", depth_mm)
-        values = [_positive(name, value) for value in np.atleast_1d(np.asarray(given, dtype=float))]
+        values = [_positive(name, value) for value in numbers_of(f"Motion.press: {name}", given)]      # type: ignore[arg-type]
         each = _share("press", over_s, len(values))
         if depth_mm is None:
             return Motion(self.steps + tuple(MotionStep(loads={"z": -force}, seconds=each) for force in values))
@@ -86,7 +100,7 @@ class Motion:
         return self._in_steps("hold", {}, steps, seconds)
 
     def _in_steps(self, name: str, ways: dict[str, float], steps: int, over_s: float | None) -> "Motion":
-        if steps < 1 or steps != int(steps):
+        if not (isinstance(steps, Real) and steps >= 1 and steps == steps // 1):
             raise InputError(f"Motion.{name}: steps={steps} is not possible; give a whole number from 1 on.")
         steps = int(steps)
         one = MotionStep({freedom: way / steps for freedom, way in ways.items() if way}, seconds=_share(name, over_s, steps))
@@ -95,17 +109,7 @@ class Motion:
     def step(self, *, ways: dict[str, float] | None = None, loads: dict[str, float] | None = None,
              over_s: float | None = None) -> "Motion":
         """One step of any freedoms: displacements (`ways`; mm, degrees) from the step's start, loads (N, N mm) at its end."""
-        return self._with(MotionStep(dict(ways or {}), dict(loads or {}), _share("step", over_s, 1)))
-
-    def _with(self, step: MotionStep) -> "Motion":
-        for name in (*step.ways, *step.loads):
-            if name not in FREEDOMS:
-                raise InputError(f"Motion: the freedom {name!r} is unknown; use one of {', '.join(FREEDOMS)}.")
-        for name, value in (*step.ways.items(), *step.loads.items()):
-            _finite(name, value)
-        if both := set(step.ways) & set(step.loads):
-            raise InputError(f"Motion: the freedom {both.pop()!r} is prescribed and loaded in one step; choose one.")
-        return Motion((*self.steps, step))
+        return Motion((*self.steps, MotionStep(dict(ways or {}), dict(loads or {}), over_s)))
 
     @property
     def depth_mm(self) -> float:
@@ -182,6 +186,8 @@ class Motion:
 
         Raises InputError that names a step it cannot parse.
         """
+        if not isinstance(text, str):
+            raise InputError(f"motion: {text!r} is no text; {_HINT}.")
         motion = cls()
         for part in filter(None, (part.strip() for part in text.split(";"))):
             terms, over = _cut(part, _OVER)
@@ -189,7 +195,7 @@ class Motion:
             if over is None:
                 terms, over = _cut(terms, _OVER)
             held, found = _HOLD.fullmatch(terms), _TERM.findall(terms)
-            if count == "0" or (over is not None if held else not found or _TERM.sub("", terms).strip(" ,")):
+            if int(count or 1) == 0 or (over is not None if held else not found or _TERM.sub("", terms).strip(" ,")):
                 raise InputError(f"motion: the step {part!r} is not understood; {_HINT}.")
             if held:
                 motion = motion.hold(_read(part, held[1]), steps=int(count or 1))
@@ -215,16 +221,34 @@ class Motion:
         return motion
 
 
+def numbers_of(name: str, given: float | Sequence[float]) -> list[float]:
+    """One number, or some, as a list.  name: what they are. Raises InputError for none, text, rows, and what is not finite."""
+    values = list(given) if np.iterable(given) and not isinstance(given, str) else [given]
+    if not values:
+        raise InputError(f"{name} is empty; give at least one number.")
+    numbers = [_number(value) for value in values]
+    for value, number in zip(values, numbers, strict=True):
+        if not math.isfinite(number):
+            raise InputError(f"{name}={repr(value) if isinstance(value, str) else value} is no number; give a finite one.")
+    return numbers
+
+
+def _number(value: Any) -> float:
+    """A value as a float; nan where it is text, a row or nothing of the kind."""
+    try:
+        return math.nan if isinstance(value, str) or np.ndim(value) else float(value)
+    except (TypeError, ValueError):
+        return math.nan
+
+
 def _finite(name: str, value: float) -> float:
-    if not math.isfinite(value):
-        raise InputError(f"Motion: {name}={value} is no number; give a finite one.")
-    return float(value)
+    return numbers_of(f"Motion: {name}", [value])[0]
 
 
 def _positive(name: str, value: float) -> float:
-    if not _finite(name, value) > 0:
+    if not value > 0:
         raise InputError(f"Motion.press: {name}={value:g} does not press; give a value above 0.")
-    return float(value)
+    return value
 
 
 def _share(name: str, over_s: float | None, steps: int) -> float | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy as np
 import trimesh
 
-from softtact.contact.motion import Motion
+from softtact.contact.motion import Motion, numbers_of
 from softtact.errors import InputError
 from softtact.geometry.meshes import check_given, read_mesh
 from softtact.geometry.pose import Pose
@@ -117,6 +117,8 @@ def task_of(spec: "Specification", pressed: "trimesh.Trimesh | SoftObject | str 
     control = RunControl(**given | {"threads": given.get("threads") or cores()}, reached=Reached(on_step))
     if not isinstance(pressed, SoftObject):
         pressed = mesh_of(pressed, unit)
+    if not motion.steps:
+        raise InputError("The motion of a press has no step; give at least one, such as Motion().press(force_n=5).")
     check_loads(motion, spec.force_range_n, spec.name)
     return PressTask(pressed, None if pose is None else Pose.of(pose), motion, control, **choice)
 
@@ -145,15 +147,18 @@ def motion_of(spec: "Specification", force_n: float | Sequence[float] | None, mo
     if (motion is None) == (force_n is None):
         raise InputError("A press takes either force_n or motion; give one of them.")
     if force_n is not None:
-        for force in np.atleast_1d(np.asarray(force_n, dtype=float)):
+        forces = numbers_of("force_n", force_n)
+        for force in forces:
             checked_forces(force, spec.force_range_n, spec.name)
-        return Motion().press(force_n=force_n)
-    return Motion.parse(motion) if isinstance(motion, str) else motion      # type: ignore[return-value]
+        return Motion().press(force_n=forces)
+    if not isinstance(motion, str | Motion):
+        raise InputError(f"motion={motion!r} is no motion; give a Motion, or its text such as \"z -1.0; x 1.0\".")
+    return Motion.parse(motion) if isinstance(motion, str) else motion
 
 
 def checked_forces(force_n: float | Sequence[float], force_range_n: tuple[float, float], name: str) -> np.ndarray:
     """Forces (N) as an increasing array within the range of the sensor of that name; others are refused."""
-    forces = np.atleast_1d(np.asarray(force_n, dtype=float))
+    forces = np.array(numbers_of("force_n", force_n))
     low, high = force_range_n
     outside = forces[~((forces > low) & (forces <= high))]
     if len(outside):
