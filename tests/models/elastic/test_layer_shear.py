@@ -69,3 +69,30 @@ def test_the_motion_decays_within_a_few_thicknesses():
 def test_a_share_above_one_is_refused():
     with pytest.raises(InputError, match="share that sticks, 1.2, is not between 0 and 1"):
         ShearedContact(1.0, 1.2, 2.0)
+
+
+@pytest.mark.parametrize(("sizes", "sentence"), [
+    ((0.0, 1.0, 1.0), "contact_radius=0 is not possible; give a finite length above 0"),
+    ((-1.0, 1.0, 1.0), "contact_radius=-1 is not possible"),
+    ((1.0, 1.0, float("inf")), "thickness=inf is not possible; give a finite length above 0"),
+    ((1.0, 1.0, 1.0, 0.7), "poisson=0.7 is not possible; give a number above -1 and up to 0.5")])
+def test_what_is_no_contact_on_a_layer_is_refused_in_a_sentence(sizes, sentence):
+    with pytest.raises(InputError, match=sentence):
+        ShearedContact(*sizes)
+
+
+def test_far_from_a_small_contact_a_thick_layer_moves_as_a_half_space_under_a_point_force():
+    """Johnson (3.76): F / (2 pi G r) along the force, (1 - nu) F / (2 pi G r) across; (7.35): centre (2 - nu) F / (8 G a)."""
+    nu, ratio = 0.3, np.array([10.0, 30.0, 60.0])
+    contact = ShearedContact(1e-4, 1.0, 1.0, nu)
+    centre = 8 / (2 * np.pi * (2 - nu) * ratio)
+    assert contact.motion(1e-4 * ratio, 0 * ratio)[:, 0] == pytest.approx(centre, rel=0.03)       # the bottom takes 1 % at 60
+    assert contact.motion(0 * ratio, 1e-4 * ratio)[:, 0] == pytest.approx((1 - nu) * centre, rel=0.03)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+def test_the_motion_of_a_small_contact_falls_without_a_jump_to_nothing(poisson):
+    contact, away = ShearedContact(0.02, 1.0, 2.0, poisson), np.geomspace(0.08, 60.0, 400)
+    along, across = contact.motion(away, 0 * away)[:, 0], contact.motion(0 * away, away)[:, 0]
+    assert (np.diff(along) < 1e-6).all(), "it falls"
+    assert np.abs(np.diff(across)).max() < 0.004 and np.abs(np.array([along, across])[:, -1]).max() < 1e-6

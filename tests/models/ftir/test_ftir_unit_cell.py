@@ -8,7 +8,7 @@ from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
-from softtact.errors import ConvergenceError
+from softtact.errors import ConvergenceError, InputError
 from softtact.models.ftir.specimen import (
     GLASS_MESH,
     SETTINGS,
@@ -133,3 +133,9 @@ def test_four_frusta_with_free_borders_share_a_plate_alike_and_spread():
     assert np.abs(carried) == pytest.approx(forces[-1] / 4, rel=1e-4)
     endless = press_cell_on_glass(CORO, LAW, forces / 4, mesh=COARSE)
     assert (np.array([load_step.state.indentation for load_step in load_steps]) > 1.2 * endless.compression_mm).all()
+
+
+@pytest.mark.parametrize("forces", [[50.0, 5.0], [-1.0], [], [1.0, float("nan")]])
+def test_forces_on_a_specimen_that_fall_or_pull_are_refused_in_a_sentence(forces):
+    with pytest.raises(InputError, match="give finite ones from 0 on that do not fall"):
+        press_specimen(None, None, forces)

@@ -41,3 +41,23 @@ def test_a_depth_beyond_the_path_is_refused():
 def test_depths_that_fall_are_refused():
     with pytest.raises(InputError, match="depths 1, 0.5 mm: give rising numbers"):
         press_disc(Disc(6.0, 2.0, 3.0), [1.0, 0.5])
+
+
+@pytest.mark.parametrize(("ask", "sentence"), [
+    (lambda: PATH.at(-0.1), "the depth -0.1 mm is not on the path; give numbers from 0 on"),
+    (lambda: PATH.at([0.5, float("nan")]), "the depth nan mm is not on the path"),
+    (lambda: PATH.depth_at(-1.0), "the force over the shear modulus -1 mm.2 is not on the path"),
+    (lambda: PATH.motion_at(-0.1, np.zeros(1)), "the depth -0.1 mm is not on the path"),
+    (lambda: press_disc(Disc(6.0, 2.0, 3.0), []), "there is no depth; give at least one"),
+    (lambda: press_disc(Disc(6.0, 2.0, 3.0), [float("nan")]), "depths nan mm: give rising numbers"),
+    (lambda: Disc(6.0, 2.0, 3.0, element_mm=0.0), "element_mm=0 is not possible; give a finite number above 0"),
+    (lambda: Disc(6.0, 2.0, -3.0), "ball_mm=-3 is not possible"),
+    (lambda: Disc(6.0, float("inf"), 3.0), "height_mm=inf is not possible"),
+    (lambda: Disc(6.0, 2.0, 3.0, friction=-0.1), "friction=-0.1 is not possible; give a finite number from 0 on")])
+def test_what_is_no_disc_and_no_place_on_its_path_is_refused_in_a_sentence(ask, sentence):
+    with pytest.raises(InputError, match=sentence):
+        ask()
+
+
+def test_no_depths_have_no_forces():
+    assert not len(PATH.at(np.zeros(0)))

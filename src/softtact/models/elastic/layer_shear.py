@@ -23,6 +23,8 @@ from softtact.models.elastic.wide_layer import surface_spectrum
 _DEEP = 20.0        # x beyond which the layer is a half-space, to 1e-15: the tail begins there
 _WAVES = 200        # wave numbers up to there, and as many beyond
 _LOG_STEP, _SHARE_STEP = 0.15, 0.1      # of the grid of computed profiles
+_POINTLIKE = 8.0    # contact radii from which a contact acts as a point force, to 0.5 %; farther out the waves would be too few
+_FARTHEST = 100.0   # thicknesses from a contact beyond which nothing moves
 _BEYOND = 60.0      # contact radii: wave number at which the tail ends
 
 
@@ -63,14 +65,22 @@ class ShearedContact:
     """Poisson's ratio of the layer."""
 
     def __post_init__(self) -> None:
+        for name in ("contact_radius", "thickness"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(f"ShearedContact: {name}={getattr(self, name):g} is not possible; give a finite length above 0.")
+        if not -1 < self.poisson <= 0.5:
+            raise InputError(f"ShearedContact: poisson={self.poisson:g} is not possible; give a number above -1 and up to 0.5.")
         if not 0 <= self.stick_share <= 1:
             raise InputError(f"the share that sticks, {self.stick_share:g}, is not between 0 and 1; correct it.")
 
     def motion(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
         """Motion (..., 2) of the surface along and across the shear, at places along and across it from the centre (...)."""
         radius, angle = np.hypot(along, across), np.arctan2(across, along)
-        _, mean, turning = self._profiles()
-        even, double = (np.interp(radius, _ratios() * self.contact_radius, profile) for profile in (mean, turning))
+        centre, *near = self._profiles()
+        ratios = _ratios() * self.contact_radius
+        far = (part / centre for part in _under_a_point(radius / self.thickness, self.poisson))
+        even, double = (np.where(radius <= ratios[-1], np.interp(radius, ratios, profile), beyond)
+                        for profile, beyond in zip(near, far, strict=True))
         return np.stack([even + double * np.cos(2 * angle), double * np.sin(2 * angle)], axis=-1)
 
     @property
@@ -94,8 +104,35 @@ class ShearedContact:
 
 
 def _ratios():
-    """Distances over the contact radius."""
-    return np.concatenate([[0.0], np.geomspace(0.05, 40, 80)])
+    """Distances over the contact radius of the computed profiles."""
+    return np.concatenate([[0.0], np.geomspace(0.05, _POINTLIKE, 61)])
+
+
+def _under_a_point(distance, poisson):
+    """Parts (...) that do not turn and turn twice with the angle of the motion under a unit force over G at one point; h = 1.
+
+    distance (...): so far from it that any contact acts as a point
+    """
+    grid, mean, turning = _times_distance(poisson)
+    far = np.clip(distance, grid[0], None)
+    return [np.interp(np.log(far), np.log(grid), part, right=0.0) / far for part in (mean, turning)]
+
+
+@cache
+def _times_distance(poisson):
+    """Distances (d,), and parts of the motion under a point times distance: of a half-space, and what the layer's bottom adds."""
+    panel, weights = legendre.leggauss(40)
+    ends = np.linspace(0, _DEEP, 2 * int(_DEEP) + 1)
+    x = (ends[:-1, None] + 0.25 * (panel + 1)).ravel()
+    weight = np.tile(0.25 * weights, len(ends) - 1)
+    _, along, across, _ = surface_spectrum(x, thickness_mm=1.0, shear_mpa=1.0, poisson=poisson)
+    distance = np.geomspace(1e-3, _FARTHEST, 400)
+    argument = np.outer(distance, x)
+    even = j0(argument)
+    double = 2 * j1(argument) / np.maximum(argument, 1e-9) - even        # J2
+    mean = 0.5 * ((2 - poisson) / distance + even @ (weight * (x * along + x * across - (2 - poisson))))
+    turning = -0.5 * (-poisson / distance + double @ (weight * (x * along - x * across + poisson)))
+    return distance, mean * distance / (2 * np.pi), turning * distance / (2 * np.pi)
 
 
 @cache

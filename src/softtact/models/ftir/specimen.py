@@ -18,7 +18,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from softtact.contact.height_field import HeightField
-from softtact.errors import ConvergenceError
+from softtact.errors import ConvergenceError, InputError
 from softtact.fem.elements import HEX27, QUAD9
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.build import build_unit_cell, lattice
@@ -196,7 +196,11 @@ def cell_family(spec: SensorSpec, law: Law, specimen: Specimen, *, largest_n: fl
 
 
 def press_specimen(family: CellFamily, specimen: Specimen, forces_n: Sequence[float] | np.ndarray) -> PressedSpecimen:
-    """The `PressedSpecimen` under total forces (f,) in N, from 0 on."""
+    """The `PressedSpecimen` under total forces (f,) in N, from 0 on, none smaller than the one before."""
+    forces = np.asarray(forces_n, dtype=float)
+    if not len(forces) or not (np.diff(forces, prepend=0.0) >= 0).all() or not np.isfinite(forces[-1]):
+        given = ", ".join(f"{force:g}" for force in forces) or "none"
+        raise InputError(f"The forces on the specimen are {given} N; give finite ones from 0 on that do not fall.")
     lag = family.height_mm * (specimen.height_factor.max() - specimen.height_factor)       # mm until the plate meets a frustum
     shape = specimen.height_factor, specimen.tip_factor
     deepest = float((family.limit * family.height_mm * specimen.height_factor + lag).min())
@@ -205,10 +209,10 @@ def press_specimen(family: CellFamily, specimen: Specimen, forces_n: Sequence[fl
         return family.force(np.maximum(0.0, descent - lag), *shape)
 
     reach = carried(deepest).sum()
-    if forces_n[-1] > reach:
-        raise ConvergenceError(f"The cells of the dielectric were pressed up to {reach:.4g} N in all, not to {forces_n[-1]:g} N; "
+    if forces[-1] > reach:
+        raise ConvergenceError(f"The cells of the dielectric were pressed up to {reach:.4g} N in all, not to {forces[-1]:g} N; "
                                "ask for smaller forces or for less scatter of the heights.")
     descents = np.array([brentq(lambda d, f=force: carried(d).sum() - f, 0.0, deepest, xtol=1e-13, rtol=1e-13) if force else 0.0
-                         for force in forces_n])
+                         for force in forces])
     areas = np.array([family.area(np.maximum(0.0, d - lag), *shape) for d in descents])
     return PressedSpecimen(descents, np.array([carried(d) for d in descents]), areas)

@@ -41,6 +41,13 @@ class Disc:
     element_mm: float = 0.4
     """Width of the elements under the ball."""
 
+    def __post_init__(self) -> None:
+        for name in ("radius_mm", "height_mm", "ball_mm", "bulk_over_shear", "element_mm"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(f"Disc: {name}={getattr(self, name):g} is not possible; give a finite number above 0.")
+        if not 0 <= self.friction < np.inf:
+            raise InputError(f"Disc: friction={self.friction:g} is not possible; give a finite number from 0 on.")
+
 
 @dataclass(frozen=True)
 class DiscPress:
@@ -59,12 +66,12 @@ class DiscPress:
 
     def at(self, depth_mm: np.ndarray | float) -> np.ndarray:
         """Force over the shear modulus at other depths: cubic and monotone in force^(1/2), which is nearly straight over depth."""
-        self._check(np.max(depth_mm), self.depth_mm[-1], "depth", "mm")
+        self._check(depth_mm, self.depth_mm[-1], "depth", "mm")
         return PchipInterpolator(self.depth_mm, np.sqrt(self.force_over_shear))(depth_mm)**2
 
     def depth_at(self, force_over_shear: np.ndarray | float) -> np.ndarray:
         """Depth in mm at a force over the shear modulus in mm^2."""
-        self._check(np.max(force_over_shear), self.force_over_shear[-1], "force over the shear modulus", "mm^2")
+        self._check(force_over_shear, self.force_over_shear[-1], "force over the shear modulus", "mm^2")
         return PchipInterpolator(np.sqrt(self.force_over_shear), self.depth_mm)(np.sqrt(force_over_shear))
 
     def motion_at(self, depth_mm: float, radius_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,8 +90,11 @@ class DiscPress:
         return (1 - share) * values[last - 1] + share * values[last]
 
     def _check(self, wanted, last, what, unit):
-        if wanted > last * (1 + 1e-9):
-            raise InputError(f"the {what} {wanted:g} {unit} is beyond the path's last, {last:g} {unit}; compute a longer path.")
+        wanted = np.ravel(wanted)
+        if not (wanted >= 0).all():
+            raise InputError(f"the {what} {wanted[~(wanted >= 0)][0]:g} {unit} is not on the path; give numbers from 0 on.")
+        if (largest := wanted.max(initial=0.0)) > last * (1 + 1e-9):
+            raise InputError(f"the {what} {largest:g} {unit} is beyond the path's last, {last:g} {unit}; compute a longer path.")
 
 
 def press_disc(disc: Disc, depths_mm: Sequence[float], *, report: Callable[[float], None] = lambda share: None) -> DiscPress:
@@ -93,7 +103,9 @@ def press_disc(disc: Disc, depths_mm: Sequence[float], *, report: Callable[[floa
     Raises ConvergenceError where a step is not reached.
     """
     depths = np.asarray(depths_mm, dtype=float)
-    if not 0 < depths[0] or (np.diff(depths) <= 0).any() or depths[-1] >= 0.9 * disc.height_mm:
+    if not len(depths):
+        raise InputError("press_disc: there is no depth; give at least one, in mm.")
+    if not (np.diff(depths, prepend=0.0) > 0).all() or not depths[-1] < 0.9 * disc.height_mm:
         raise InputError(f"depths {', '.join(f'{one:g}' for one in depths)} mm: give rising numbers above 0 and below nine tenths "
                          f"of the gel's height, {disc.height_mm:g} mm.")
     ways = [{"y": -float(step)} for step in np.diff(np.concatenate([[0.0], depths]))]
