@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from softtact.errors import InputError
-from softtact.geometry.meshes import check_over_sensor, facets_over, merge_facets, place, read_mesh, read_triangles
+from softtact.contact.lower_envelope import NO_CONTACT_MM
+from softtact.errors import InputError, MissError
+from softtact.geometry.meshes import HIGHEST_MM, check_over_sensor, facets_over, merge_facets, place, read_mesh, read_triangles
 from softtact.geometry.pose import Pose
 
 FOOTPRINT = (22.0, 37.0)
@@ -200,6 +201,13 @@ def test_an_object_that_covers_the_whole_sensor_is_over_it():
     mesh = place(box((100, 100, 10)))      # no corner lies over the footprint
     assert facets_over(mesh.triangles, FOOTPRINT).any()
     check_over_sensor(mesh, FOOTPRINT)
+
+
+def test_an_object_a_metre_above_the_sensor_is_refused_with_its_height():
+    check_over_sensor(place(box(), pose=Pose([0, 0, 900])), FOOTPRINT)
+    with pytest.raises(MissError, match="The object is 1185 mm above the sensor, .* from below 1000 mm; lower its pose"):
+        check_over_sensor(place(box(), pose=Pose([0, 0, 1200])), FOOTPRINT)
+    assert HIGHEST_MM == NO_CONTACT_MM, "heights from there on stand for no object"
 
 
 def test_a_ring_around_the_sensor_is_not_over_it():

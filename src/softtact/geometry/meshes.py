@@ -17,6 +17,7 @@ from softtact.geometry.pose import Pose
 
 MIN_SIZE_MM = 1.0  # far below a taxel's resolution
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
+HIGHEST_MM = 1000.0  # over a sensor; heights from there on stand for no object (`contact.lower_envelope.NO_CONTACT_MM`)
 _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are merged
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
 _FOLD = 5e-7  # one minus the cosine of the angle, 1e-3, below which two facets on one side of an edge lie on each other
@@ -152,9 +153,14 @@ def default_pose(mesh: trimesh.Trimesh) -> Pose:
 
 
 def check_over_sensor(mesh: trimesh.Trimesh, footprint_mm: tuple[float, float], *, name: str = "The object") -> None:
-    """Refuse a placed mesh of which no facet lies over the sensor's footprint (x, y sides in mm)."""
-    if not np.any(facets_over(mesh.triangles, footprint_mm)):
+    """Refuse a placed mesh of which no facet lies over the sensor's footprint (x, y sides in mm), or that is far above it."""
+    over = facets_over(mesh.triangles, footprint_mm)
+    if not np.any(over):
         raise misses_sensor(mesh.vertices, footprint_mm, name=name)
+    lowest = float(mesh.triangles[over][..., 2].min())
+    if lowest >= HIGHEST_MM:
+        raise MissError(f"{name} is {lowest:.4g} mm above the sensor, and it is only followed to first touch from below "
+                        f"{HIGHEST_MM:g} mm; lower its pose, or correct its unit.")
 
 
 def misses_sensor(points: np.ndarray, footprint_mm: tuple[float, float], *, name: str = "The object") -> MissError:
