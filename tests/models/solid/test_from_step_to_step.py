@@ -1,5 +1,6 @@
 """What goes on from step to step of a path: the penalty of a contact, and the loads of freedoms that a step does not name."""
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -9,6 +10,7 @@ from softtact.contact.surfaces import Surface
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
+from softtact.models.solid.frames import FramePose
 from softtact.models.solid.path import SolidPath
 
 
@@ -71,3 +73,24 @@ def test_a_step_that_is_too_large_is_divided_with_its_reason_and_no_force_of_the
                      held={"z0": "xyz"}, carried={"grip": ((0, 0, 2), ["z1"])})
     (step,) = SolidPath(body, {"grip": Motion().step(ways={"z": -1.3})}, tell=told.append).run()
     assert step.increments > 1 and told[0] == "increment divided: The prescribed step turns an element inside out."
+
+
+@pytest.mark.parametrize("torque_nmm", [0.02, 0.1])
+def test_a_torque_tilts_an_object_without_friction_until_the_surface_bears_it(torque_nmm):
+    told, loads = [], {"z": -0.2, "rx": torque_nmm}
+    _, tilted = SolidPath(block_under_a_plate(), {"plate": Motion().press(force_n=0.2).step(loads=loads)}, tell=told.append).run()
+    assert tilted.loads[0, [2, 3]] == pytest.approx([-0.2, torque_nmm], rel=1e-4) and not told
+    assert tilted.state.poses[0].step_from(FramePose())[3] > 0, "it turns in the sense of its torque"
+
+
+@pytest.mark.parametrize("step", [[0.1, -0.2, 0.3, 0.4, 0.5, -0.6], [0, 0, 0, 0, 0, 3.0]])
+def test_the_step_from_one_pose_to_another_leads_there(step):
+    before = FramePose().moved(np.array([1.0, 2.0, 3.0, 0.7, -0.8, 0.9]))
+    assert before.moved(np.array(step)).step_from(before) == pytest.approx(step, abs=1e-12)
+
+
+def test_the_work_of_a_bar_twisted_by_60_degrees_in_one_step_is_its_strain_energy():
+    body = SolidBody(box((-1, -1, 0), (1, 1, 4), (3, 3, 4)), {"body": make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=50)},
+                     held={"z0": "xyz"}, carried={"grip": ((0, 0, 4), ["z1"])})
+    (step,) = SolidPath(body, {"grip": Motion().turn(z_deg=60)}).run()
+    assert step.work_mj == pytest.approx(step.state.strain_energy, rel=0.01)

@@ -44,6 +44,11 @@ class FramePose:
         """The pose after a step (6,): a translation in mm and a rotation vector in radians, both in the fixed frame."""
         return FramePose(self.translation + step[:3], Rotation.from_rotvec(step[3:]).as_matrix() @ self.rotation)
 
+    def step_from(self, before: "FramePose") -> np.ndarray:
+        """The step (6,) in mm and radians by which `before.moved` leads here; a turn is less than half of a full one."""
+        turn = Rotation.from_matrix(self.rotation @ before.rotation.T).as_rotvec()
+        return np.concatenate([self.translation - before.translation, turn])
+
     def displacement(self, frame: Frame, points: np.ndarray) -> np.ndarray:
         """Displacements (k, 3) in mm of the frame's nodes, all nodes at rest at points (n, 3)."""
         arm = points[frame.nodes] - frame.point

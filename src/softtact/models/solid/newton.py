@@ -168,18 +168,9 @@ class _Balance:
         return smaller if lower is None else lower  # a residual alone may fall and rise in turns where points touch and leave
 
     def _work(self, before: SolidState, after: SolidState) -> float:
-        """Work in mJ of the loads of the frames' loaded freedoms in a step; rotations by their small angles."""
-        work = 0.0
-        for frame, freedom in self.target.unknown:
-            old, new = before.poses[frame], after.poses[frame]
-            if freedom < 3:
-                moved = new.translation[freedom] - old.translation[freedom]
-            else:
-                i, j = (freedom - 1) % 3, (freedom - 2) % 3
-                turn = new.rotation @ old.rotation.T
-                moved = 0.5 * (turn[j, i] - turn[i, j])
-            work += self.target.loads[frame][freedom] * moved
-        return work
+        """Work in mJ of the loads of the frames' loaded freedoms in a step."""
+        moved = [new.step_from(old) for old, new in zip(before.poses, after.poses, strict=True)]
+        return sum(self.target.loads[frame][freedom] * float(moved[frame][freedom]) for frame, freedom in self.target.unknown)
 
     def accepted(self, state: SolidState, trial: SolidState) -> None:
         self.just_predicted = self.pending

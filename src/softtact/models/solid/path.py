@@ -195,9 +195,7 @@ class SolidPath:
         body, work, lost = self.body, 0.0, 0.0
         loads = 0.5 * (body.frame_loads(before) + body.frame_loads(after))
         for k, (old, new) in enumerate(zip(before.poses, after.poses, strict=True)):
-            turn = new.rotation @ old.rotation.T
-            spin = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-            work += float(loads[k, :3] @ (new.translation - old.translation) + loads[k, 3:] @ spin)
+            work += float(loads[k] @ new.step_from(old))
         for face, one, two in zip(body.pressures, before.pressures, after.pressures, strict=True):
             force, mean = np.zeros_like(body.points), 0.5 * (one + two)
             x = body.points + 0.5 * (before.displacement + after.displacement)
