@@ -213,6 +213,10 @@ class ContactPair:
         """Deepest overlap of single points."""
         return state.penetration_mm()
 
+    def unresolved_n(self, history: PairHistory, state: PairState, penetration_mm: float) -> float:
+        """Force in N at an overlap of so much of all points that touch."""
+        return penetration_mm * float(history.points.weight @ state.slope)
+
     def gap_mm(self, state: PairState) -> float:
         """Least gap of the points; infinite where none is within reach of the other surface."""
         return float(np.min(state.projection.gap, initial=np.inf))

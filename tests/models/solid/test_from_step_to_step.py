@@ -94,3 +94,13 @@ def test_the_work_of_a_bar_twisted_by_60_degrees_in_one_step_is_its_strain_energ
                      held={"z0": "xyz"}, carried={"grip": ((0, 0, 4), ["z1"])})
     (step,) = SolidPath(body, {"grip": Motion().turn(z_deg=60)}).run()
     assert step.work_mj == pytest.approx(step.state.strain_energy, rel=0.01)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("ways", [{"x": 0.1}, {"x": 0.37}, {"rz": 10.0}])
+def test_an_object_that_lies_on_the_surface_is_moved_aside_or_turned_at_once(ways, friction):
+    body = block_under_a_plate()
+    body.items[0].friction = friction
+    (step,) = SolidPath(body, {"plate": Motion().step(ways=ways)}).run()
+    assert step.increments == 1 and step.iterations <= 10
+    assert step.residual_n < 1e-6 * 20.0 * 1e-3 * 4.0, "N: penalty, overlap and area, and a millionth of their product"

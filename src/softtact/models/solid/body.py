@@ -288,6 +288,10 @@ class SolidBody:
             largest = max(largest, force * (1.0 + farthest / length))
         return _ROUND_OFF * largest
 
+    def unresolved_n(self, state: SolidState, penetration_mm: float) -> float:
+        """Force in N that its contacts would bear at an overlap of so much wherever they touch: no contact is known better."""
+        return sum(item.unresolved_n(history, response, penetration_mm) for item, history, response in self.item_states(state))
+
     def _lengths(self, nodes: np.ndarray) -> np.ndarray:
         """Least extents (e,) in mm of elements (e, k) along the axes in which they extend."""
         extents = np.ptp(self.points[nodes], axis=1)

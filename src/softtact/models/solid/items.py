@@ -91,6 +91,10 @@ class Item(Protocol):
         """Deepest overlap of surfaces in mm."""
         return 0.0
 
+    def unresolved_n(self, history: Any, response: Any, penetration_mm: float) -> float:
+        """Force in N at an overlap of so much of all that touches."""
+        return 0.0
+
     def gap_mm(self, response: Any) -> float:
         """Least gap in mm of what may touch; infinite where nothing may."""
         return np.inf

@@ -79,8 +79,10 @@ class _Balance:
         return float(max(np.abs(self.body.residual(state)).max(initial=0.0), np.abs(off).max(initial=0.0)))
 
     def balanced(self, state: SolidState, residual: float) -> bool:
-        # Without loads, as in a body that moves freely, rounding is all that is left.
-        return not self.pending and residual <= max(self.settings.relative_residual * state.size, self.body.rounding_n(state))
+        # Without loads rounding is all that is left, as in a body that moves freely, or forces of overlaps far below the allowed
+        # one, as of an object that lies on the surface.
+        size = max(state.size, self.body.unresolved_n(state, self.settings.penetration_mm))
+        return not self.pending and residual <= max(self.settings.relative_residual * size, self.body.rounding_n(state))
 
     def step(self, state: SolidState) -> tuple[SolidState, Any]:
         body, unknown = self.body, self.target.unknown
