@@ -172,6 +172,19 @@ def test_a_motion_presses_with_friction_as_forces_alone_do():
     assert first.state.indentation == pytest.approx(straight.state.indentation, rel=2e-4)
 
 
+@pytest.mark.parametrize("lift_mm", [0.2, 3.0])
+def test_a_load_after_a_step_without_contact_finds_the_cover_as_it_does_from_the_start(lift_mm):
+    body = build_sensor_body(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
+
+    def surface(x, y):
+        return 0.15 * (x**2 + y**2), np.column_stack([0.3 * x, 0.3 * y, -np.ones(len(x))]) / np.sqrt(
+            1 + 0.09 * (x**2 + y**2))[:, None]
+
+    (straight,) = press_load_steps(body, surface, [1.0], settings=TIGHT)
+    lifted, pressed = press_motion(body, surface, Motion().step(ways={"z": lift_mm}).press(force_n=1.0), 0.0, settings=TIGHT)
+    assert lifted.force_n == 0 and pressed.state.indentation == pytest.approx(straight.state.indentation, rel=2e-4)
+
+
 def test_an_object_wider_than_the_pad_touches_where_it_is_over_the_pad():
     """All corners of a plate lie beside the pad; lifted by 1 mm it touches after 1 mm, from where its depth counts."""
     plate = trimesh.creation.box((20.0, 20.0, 1.0))

@@ -104,3 +104,23 @@ def test_an_object_that_lies_on_the_surface_is_moved_aside_or_turned_at_once(way
     (step,) = SolidPath(body, {"plate": Motion().step(ways=ways)}).run()
     assert step.increments == 1 and step.iterations <= 10
     assert step.residual_n < 1e-6 * 20.0 * 1e-3 * 4.0, "N: penalty, overlap and area, and a millionth of their product"
+
+
+@pytest.mark.parametrize("before", [
+    [{"z": 0.1}], [{"z": 1.5}], [{"z": -0.1}, {"z": 0.2}], [{"x": 0.37}, {"x": -0.37}], [{}]])
+def test_a_load_after_a_step_without_contact_finds_the_surface_as_it_does_from_the_start(before):
+    motion = Motion()
+    for ways in before:
+        motion = motion.step(ways=ways)
+    *_, loaded = SolidPath(block_under_a_plate(), {"plate": motion.press(force_n=0.2)}).run()
+    (straight,) = SolidPath(block_under_a_plate(), {"plate": Motion().press(force_n=0.2)}).run()
+    assert loaded.loads[0] == pytest.approx(straight.loads[0], abs=2e-6) and loaded.increments == 1
+    assert loaded.state.poses[0].translation == pytest.approx(straight.state.poses[0].translation, abs=1e-5)
+
+
+def test_a_load_on_an_object_that_the_surface_bears_goes_on_from_there():
+    motion = Motion().press(force_n=[0.1, 0.2])
+    path = SolidPath(block_under_a_plate(), {"plate": motion})
+    first, _ = path.run()
+    assert path._bears(first.state, {"plate": motion.steps[1]})
+    assert not path._bears(path.body.rest(), {"plate": motion.steps[1]})

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from softtact.contact.edges import OVERRUN_MM
+from softtact.contact.lower_envelope import NO_CONTACT_MM
 from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.mesh_settings import FULL_POCKET, NewtonSettings
@@ -13,7 +14,7 @@ from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after smaller steps only points that oscillate across an edge would change their facet
-_MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover touches the object
+_MOST_INCREMENTS, _FAR = 100, 50  # of the first touch's depth, until a point of the cover touches the object; a gap that is far
 # Augmentation stops after so many augmentations that took Newton steps without reducing the overlap below this share of the least
 # one so far. Those without Newton steps do not count: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
@@ -43,9 +44,13 @@ def first_touch(body: LayeredBody, surface: ObjectSurface, settings: NewtonSetti
 
 
 def _indented_until_contact(body, state, step_mm):
-    """The state with the object lowered in steps until a point touches it: a tip may be between the contact points."""
+    """The state with the object lowered in steps until a point touches it: a tip may be between the contact points.
+
+    From far above it is first lowered by the least gap: planes come nearer by no more than that.
+    """
     for _ in range(_MOST_INCREMENTS):
-        state = body.indented(state, step_mm)
+        gap = float(body.slab.top.surface_gaps(state.slab).min())
+        state = body.indented(state, gap if _FAR * step_mm < gap < NO_CONTACT_MM else step_mm)
         if state.force > 0:
             return state
     raise ConvergenceError(f"None of the cover's contact points touches the object, though it went down by "

@@ -145,6 +145,10 @@ class SolidBody:
         shift[: len(body)][np.isin(body, mine)] = translation
         return shift.ravel()[self.free]
 
+    def is_free(self, frame: int) -> bool:
+        """Whether a frame carries a rigid object, or soft bodies that nothing else holds: contact alone bears its loads."""
+        return bool(self.frames[frame].nodes.min() >= len(self.mesh.points) or self.shifted_with(frame, np.ones(3)).any())
+
     def surface_nodes(self, frame: str) -> np.ndarray:
         """Facets (t, 3) of a rigid object, in nodes of this body."""
         return self._surfaces[frame]

@@ -7,12 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from softtact.contact.motion import FREEDOMS, Motion, MotionStep
+from softtact.contact.pair import ContactPair
 from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.materials.laws.stretches import stretch_range
 from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.frames import step_vector
 from softtact.models.solid.newton import LostContactError, SolidSettings, Target, balance
 
+_WITHIN_REACH = 0.9  # of the distance at which points meet a surface: step of an object that is still farther away
+_TOUCHES = 1e-3  # of the allowed overlap: surfaces that overlap by less only lie on each other
 _OVERLAP_MM = 1e-3  # overlap of a loaded object with the surface before its load acts, so that contact resists it
 _FAST = 8  # iterations of an increment up to which the next one may be larger
 _RELAXED = 0.5  # of the shortest relaxation time, or of the time since the last change of rate: longest increment of what relaxes
@@ -92,7 +95,7 @@ class SolidPath:
         for number in range(self.steps):
             began = time.perf_counter()
             steps = {name: still_loaded(steps.get(name), motion.steps[number]) for name, motion in self.motions.items()}
-            if not in_contact and any(step.loads for step in steps.values()):
+            if any(step.loads for step in steps.values()) and not (in_contact and self._bears(state, steps)):
                 state = self._at_first_contact(state, steps)
             in_contact = True
             values = np.array([self.pressures[face.name][number] for face in self.body.pressures])
@@ -205,6 +208,13 @@ class SolidPath:
             lost += item.dissipated_mj(*both)
         return work, lost
 
+    def _bears(self, state, steps):
+        """Whether surfaces press, or bodies hold every loaded frame: a load then finds what it acts against."""
+        pressing = sum(item.totals(*both).size for item, *both in self.body.item_states(state) if isinstance(item, ContactPair))
+        free = [frame for frame, one in enumerate(self.body.frames) if one.name in steps and steps[one.name].loads
+                and self.body.is_free(frame)]
+        return not free or pressing > _TOUCHES * self.body.unresolved_n(state, self.settings.penetration_mm)
+
     def _at_first_contact(self, state, steps):
         """The state with loaded frames moved along their forces until their surfaces just overlap."""
         directions = [np.zeros(6) for _ in self.body.frames]
@@ -218,10 +228,8 @@ class SolidPath:
             gap = min(item.gap_mm(response) for item, _, response in self.body.item_states(state))
             if gap <= -0.5 * _OVERLAP_MM:
                 return state
-            if not np.isfinite(gap):
-                raise InputError(
-                    "The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct its pose."
-                )
+            if not np.isfinite(gap):      # no point is within reach: none can pass the surface in a step that is shorter
+                gap = _WITHIN_REACH * min(pair.reach_mm for pair in self.body.pairs)
             nearer = [direction * (gap + _OVERLAP_MM) for direction in directions]
             moved = self.body.moved(state, sum(self.body.shifted_with(k, step[:3]) for k, step in enumerate(nearer)), nearer)
             assert moved is not None
