@@ -2,8 +2,10 @@
 
 Normal: penalty with offsets (augmented Lagrange in terms of lengths): p = k max(0, offset - g), and an augmentation makes a point's
 last overlap its offset, so that the same pressure leaves none. Friction: the traction on the points' surface is that of the step's
-beginning minus k times the slip on the other surface since, held to mu p. Of its tangent, the part by which the
-bound changes with the pressure is not symmetric; it is kept apart (`add_coupling`), so that the matrix is symmetric.
+beginning minus k times the slip on the other surface since, held to mu p. A point that comes to touch within a step slips from
+where it met the other surface on: that is known once the other side has moved, so it rubs from then on (`anchored`).
+Of friction's tangent, the part by which the bound changes with the pressure is not symmetric; it is kept apart (`add_coupling`), so
+that the matrix is symmetric.
 References: Wriggers, Computational Contact Mechanics, 2nd ed. (2006), ch. 4 to 6; Simo and Laursen, Comput. Struct. 42 (1992) 97.
 """
 
@@ -80,7 +82,13 @@ class ContactPair:
             self._slip(points, anchor, anchor, x),
             np.zeros(count),
             self.stiffness,
+            anchor.gap < _ROUNDING_MM,
+            self._begun(points, anchor, x),
         )
+
+    def _begun(self, points, anchor, x):
+        """Places (2, p, 3) in mm of the points and of their anchors."""
+        return np.array([places(points, x), places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)])
 
     def _slip(self, points, anchor, projection, x):
         """Vectors (p, 3) in mm from the anchors to the points' feet on the other surface."""
@@ -114,12 +122,13 @@ class ContactPair:
 
     def begin_step(self, history: PairHistory, state: PairState, x: np.ndarray, at_rest: np.ndarray) -> PairHistory:
         """The history as a step begins, from a balanced state with nodes at x (n, 3): new anchors and, of segments, new points."""
-        slid = history.slid + state.slid_mm
+        slid = np.where(state.pressure > 0, history.slid + state.slid_mm, 0.0)
         traction = np.where((state.pressure > 0)[:, None], state.friction, 0.0)
         if not self.segments or self.itself:
             start = self._slip(history.points, state.projection, state.projection, x)
             kept = np.einsum("pki,pi->pk", self._frames(state.projection, x), traction)
-            return replace(history, traction=kept, anchor=state.projection, start=start, slid=slid, overlap_mm=np.inf)
+            return replace(history, traction=kept, anchor=state.projection, start=start, slid=slid, rubs=state.slope > 0,
+                           begun=self._begun(history.points, state.projection, x), overlap_mm=np.inf)
         fresh = self._fresh(self._points(x, at_rest), x)
         if not len(fresh.points.facet) or not len(history.points.facet):
             return fresh
@@ -130,6 +139,7 @@ class ContactPair:
             traction=np.einsum("pki,pi->pk", self._frames(fresh.anchor, x), traction[near]),
             slid=slid[near],
             stiffness=history.stiffness,
+            rubs=state.slope[near] > 0,
         )
 
     def evaluate(self, history: PairHistory, x: np.ndarray, before: PairState | None = None, *, nearby: bool = False) -> PairState:
@@ -162,7 +172,7 @@ class ContactPair:
         if not self.friction:
             return np.zeros((count, 3)), np.zeros((0, 3, 3)), np.zeros((count, 3)), np.ones(count, bool), 0.0
         anchor, bound = history.anchor, self.friction * pressure
-        acts = touches & (anchor.facet >= 0)
+        acts = touches & (anchor.facet >= 0) & history.rubs
         tangential = np.eye(3) - projection.normal[:, :, None] * projection.normal[:, None]
         slip = self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)
         slip = np.where(acts[:, None], slip, 0.0)
@@ -292,6 +302,26 @@ class ContactPair:
             nodes = np.hstack([nodes, self.other.nodes[facet[meets[first]], : self.other.width]])
         return np.ascontiguousarray(np.where(nodes < 0, nodes[:, :1], nodes)), pair
 
+    def anchored(self, history: PairHistory, state: PairState, x: np.ndarray) -> PairHistory:
+        """The history with an anchor for points that came to touch since the step began: where they met the other surface.
+
+        They met as their gap closed by the motion of the side that came nearer; the other one gave way from then on.
+        """
+        new = self._new(history, state)
+        if not new.any():
+            return history
+        normal, apart = state.projection.normal, history.begun[0] - history.begun[1]
+        point, anchor = self._begun(history.points, history.anchor, x) - history.begun
+        nearer = np.einsum("kpi,pi->kp", np.array([-point, anchor]), normal)
+        gap, fastest = (apart * normal).sum(axis=1), np.maximum(nearer.max(axis=0), 1e-300)
+        share = np.clip(gap / fastest, 0.0, 1.0)[:, None]
+        met = apart + share * np.where((nearer[1] >= nearer[0])[:, None], -anchor, point)
+        return replace(history, start=np.where(new[:, None], met, history.start), rubs=history.rubs | new)
+
+    def _new(self, history, state):
+        """Points (p,) under pressure that did not touch as the step began and have no anchor of their own yet."""
+        return ~history.rubs & (state.pressure > 0) & (history.anchor.facet >= 0) & (self.friction > 0)
+
     def augmented(self, history: PairHistory, state: PairState) -> PairHistory:
         """The history with offsets that hold the surfaces where they just touch, in the mean and the slope over each facet.
 
@@ -329,7 +359,9 @@ class ContactPair:
         return (basis * np.linalg.solve(gram, right[..., None])[points.facet, :, 0]).sum(axis=1)
 
     def settled(self, history: PairHistory, state: PairState, tolerance_mm: float) -> bool:
-        """Whether surfaces overlap by no more than the tolerance, and pressed points lie over the facets that they meet."""
+        """Whether surfaces overlap by no more than the tolerance, pressed points lie over the facets that they meet, and rub."""
+        if np.isinf(history.overlap_mm) and self._new(history, state).any():      # once, for a few may touch and leave in turns
+            return False
         here = np.flatnonzero(state.pressure > 0)
         facets, (xi, eta) = state.projection.facet[here], state.projection.coordinates[here].T
         kinds = self.other.kinds[facets]

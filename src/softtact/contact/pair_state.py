@@ -34,11 +34,15 @@ class PairHistory:
     anchor: Projection
     """Where the points were on the other surface when the step began."""
     start: np.ndarray
-    """(p, 3) in mm: by how much the anchors lay beside the points' feet when the step began; 0 but at a surface's end."""
+    """(p, 3) in mm from the anchors to the points where their slip begins: when the step began, or where they met the surface."""
     slid: np.ndarray
-    """(p,) in mm: length of the points' slip on the other surface, up to the step's beginning."""
+    """(p,) in mm: length of the points' slip on the other surface since they came to touch it, up to the step's beginning."""
     stiffness: float
     """Penalty in N/mm3: the pair's, or larger where augmentations hardly lowered the overlap."""
+    rubs: np.ndarray
+    """(p,) whether friction acts on points under pressure: of those that touched when the step began, and those anchored since."""
+    begun: np.ndarray
+    """(2, p, 3) in mm: places of the points and of their anchors when the step began."""
     overlap_mm: float = np.inf
     """Deepest overlap at the step's last augmentation; infinite before its first one."""
 

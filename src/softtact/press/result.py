@@ -122,8 +122,8 @@ class PressResult:
     """(step, y, x, 3) in MPa: the object's force on the sensing surface per area at rest, along x, y, z; z is negative where it
     presses. Of the elastic model's presses with a motion, of gels with a camera, and of the solid model; else nan."""
     slip: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
-    """(step, y, x) in mm: how far the surface slid along the object since first contact; nan where it does not touch, and where
-    the model has no friction."""
+    """(step, y, x) in mm: how far the surface slid along the object since it last came to touch; nan where it does not touch,
+    and where the model has no friction."""
     expected_error_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step"))
     """(step,) in mm: expected error against the hyperelastic model, root mean square over the map, for a fast model on frusta and
     where the model was chosen by it; else nan. Its accuracy: docs/explanation/fast_models.md."""

@@ -53,6 +53,14 @@ def without_pressure(body, state):
     return body.with_histories(state, with_pressures(body.items, state.item_histories, [0.0]))
 
 
+def rubbing(body, state):
+    """The state with friction on all points under pressure, from where they met the other surface on."""
+    (pair, history, contact), (_, pressure, _) = body.item_states(state)
+    found = body.with_histories(state, (pair.anchored(history, contact, body.points + state.displacement), pressure))
+    assert np.array_equal(np.linalg.norm(found.contacts[0].friction, axis=1) > 0, contact.pressure > 0)
+    return found
+
+
 def whole_matrix(body, state):
     upper = body.tangent(state).toarray()
     return np.triu(upper) + np.triu(upper, 1).T
@@ -74,7 +82,7 @@ def test_the_tangent_of_bodies_in_frictionless_contact_is_the_derivative_of_the_
 def test_the_residual_is_the_derivative_of_the_potential_with_friction_but_for_turning_normals(geometry):
     body, rng = two_blocks(0.4, geometry)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05 if geometry == "solid" else 0, 0, 0, 0])
-    state = without_pressure(body, state)
+    state = rubbing(body, without_pressure(body, state))
     v, h = rng.standard_normal(len(body.free)), 1e-6
     ahead, behind = (body.moved(state, s * h * v, [np.zeros(6)]).energy for s in (1, -1))
     assert state.contacts[0].slides.any()
@@ -84,7 +92,7 @@ def test_the_residual_is_the_derivative_of_the_potential_with_friction_but_for_t
 def test_with_its_coupling_the_tangent_of_sliding_friction_is_the_derivative_of_the_residual_but_for_turning_normals():
     body, rng = two_blocks(0.4)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05, 0, 0, 0])
-    state = without_pressure(body, state)
+    state = rubbing(body, without_pressure(body, state))
     v, h = rng.standard_normal(len(body.free)), 1e-7
     ahead, behind = (body.residual(body.moved(state, s * h * v, [np.zeros(6)])) for s in (1, -1))
     change, coupling = np.zeros(body.points.size), np.zeros_like(body.points)
@@ -100,7 +108,7 @@ def test_with_its_coupling_the_tangent_of_sliding_friction_is_the_derivative_of_
 def test_a_solution_with_sliding_friction_is_that_of_the_matrix_and_its_coupling():
     body, rng = two_blocks(0.4)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05, 0, 0, 0])
-    state = without_pressure(body, state)
+    state = rubbing(body, without_pressure(body, state))
     right = rng.standard_normal((len(body.free), 2))
     for k, found in enumerate(body.solve(state, right, turning=False).T):
         change, coupling = np.zeros(body.points.size), np.zeros_like(body.points)

@@ -79,6 +79,10 @@ class Item(Protocol):
         """Whether its constraints are met."""
         return True
 
+    def anchored(self, history: Any, response: Any, x: np.ndarray) -> Any:
+        """The history with friction from where points came to touch since the increment began."""
+        return history
+
     def augmented(self, history: Any, response: Any) -> Any:
         """The history with multipliers that meet its constraints better."""
         return history

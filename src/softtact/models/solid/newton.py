@@ -68,7 +68,8 @@ class _Balance:
     floating: bool = False
 
     def prepared(self, state: SolidState, iteration: int) -> SolidState:
-        return state
+        # What is prescribed has moved now, so where new contacts met it is known, nearly, before friction acts on them.
+        return _anchored(self.body, state) if self.just_predicted and self.body.frictional else state
 
     def _loads_off(self, state: SolidState) -> np.ndarray:
         loads = self.body.frame_loads(state)
@@ -184,6 +185,14 @@ class _Balance:
         return False
 
 
+def _anchored(body, state):
+    """The state with friction on points that came to touch since the increment began."""
+    x = body.points + state.displacement
+    histories = tuple(item.anchored(history, response, x) for item, history, response in body.item_states(state))
+    same = all(one is other for one, other in zip(histories, state.item_histories, strict=True))
+    return state if same else body.with_histories(state, histories)
+
+
 def _solved(schur: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Steps of the loaded freedoms; of a frame that touches nothing, which nothing resists, along its load."""
     try:
@@ -209,7 +218,7 @@ def _without_friction(body, start, target, settings, pending):
         return start, found.iterations, pending
     histories = with_pressures(body.items, start.item_histories, found.state.pressures)
     guess = body.evaluate(found.state.displacement, found.state.poses, histories, start)
-    return guess, found.iterations, False
+    return _anchored(body, guess), found.iterations, False
 
 
 def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidSettings) -> tuple[SolidState, int, float]:
@@ -260,6 +269,7 @@ def _settled(body, state, target, settings, pending, iterations):
         state, pending = found.state, False
         if all(item.settled(*both, settings.penetration_mm) for item, *both in body.item_states(state)):
             return state, iterations, found.residual_n
+        state = _anchored(body, state)
         state = body.with_histories(state, (item.augmented(*both) for item, *both in body.item_states(state)))
     worst = max(item.overlap_mm(*both) for item, *both in body.item_states(state))
     if worst <= settings.penetration_mm:

@@ -45,7 +45,7 @@ class SolidFields:
     contact_traction_mpa: np.ndarray = _array("MPa", "step", "pair", "node", _XYZ, later=True)
     """(s, p, n, 3): force on the pair's surface per area at rest, friction and pressure; nan as above."""
     contact_slip_mm: np.ndarray = _array("mm", "step", "pair", "node", later=True)
-    """(s, p, n): how far the surface slid along the other one up to the step's end; nan where it does not touch it."""
+    """(s, p, n): how far the surface slid along the other one since it last came to touch; nan where it does not touch it."""
     volume_ratio: np.ndarray = _array("1", "step", "node")
     """(s, n) J."""
     von_mises_mpa: np.ndarray = _array("MPa", "step", "node")
