@@ -119,10 +119,10 @@ def test_a_press_that_cannot_be_made_has_its_sentence_and_leaves_the_others(sens
 
 
 def test_a_press_that_does_not_settle_says_so_and_leaves_the_others(sensor, monkeypatch):
-    def touch_or_fail(compliance, underside, forces_n):
+    def touch_or_fail(compliance, underside, forces_n, **options):
         if forces_n[-1] == JOBS[1][2]:
             raise ConvergenceError(f"not settled at {forces_n[-1]:g} N")
-        return touch_object(compliance, underside, forces_n)
+        return touch_object(compliance, underside, forces_n, **options)
 
     wanted = pressed(sensor, JOBS[:3])
     monkeypatch.setattr("softtact.models.elastic.batch.touch_object", touch_or_fail)

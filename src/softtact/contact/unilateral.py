@@ -11,6 +11,7 @@ References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould,
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,8 +22,10 @@ _ROUNDING = 1e-12     # of squared residuals in single precision
 _NEWTONS, _EXACT = 100, 1e-14     # steps to the depth on springs at most, and its relative error
 _AS_WIDE = 0.8    # least share of the last load step's points for which a load step starts from the last one's forces, scaled
 # Candidate points lie within REACH times the expected depth plus LEAST_REACH_MM; points within RISE times the depth may touch. The
-# elastic layer is stiffer than springs, so that RISE times the depth on springs is enough.
+# elastic layer is stiffer than springs, so that RISE times the depth on springs is enough, but for a recess into which it bulges.
 REACH, LEAST_REACH_MM, RISE = 1.3, 0.1, 1.15
+MISSED_MM = 2e-6      # overlap at points left out of a contact that is not the rounding of single precision
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,37 @@ class ContactLoadSteps:
     def penetration(self) -> np.ndarray:
         """Deepest overlap (l,) in mm."""
         return np.maximum(0.0, -self.gap.min(axis=0))
+
+
+def among_candidates(solve: Callable[[float], _Found], needed_mm: Callable[[_Found, float], float], *, reach_mm: float,
+                     most_mm: float) -> _Found:
+    """A contact among candidate points within a reach over first touch; repeated with more of them until they are enough.
+
+    solve(reach): the contact among points within a reach in mm, which begins with `reach_mm` and ends with `most_mm`, all points
+    needed_mm(contact, reach): the reach that it asks for
+    """
+    while True:
+        reach_mm = min(reach_mm, most_mm)
+        found = solve(reach_mm)
+        if reach_mm >= most_mm or needed_mm(found, reach_mm) <= reach_mm:
+            return found
+        reach_mm *= REACH
+
+
+@compiled
+def highest_missed(heights: np.ndarray, reach: float, down: np.ndarray, depth: np.ndarray) -> float:
+    """Height in mm of the highest point beyond a reach at which the surface would penetrate the object; the reach if there is none.
+
+    heights (n,), reach: in mm over first touch, as the depths (l,);  down (l, n): of the surface under the contact's forces in mm,
+    negative where it bulges
+    """
+    highest = reach
+    for n in range(len(heights)):
+        if heights[n] > highest:
+            for l in range(len(depth)):
+                if heights[n] + down[l, n] < depth[l] - MISSED_MM:
+                    highest = heights[n]
+    return highest
 
 
 class DenseCompliance:

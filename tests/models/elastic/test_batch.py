@@ -139,10 +139,10 @@ def test_on_the_processor_the_error_of_one_press_leaves_the_others_as_they_are(c
     objects, forces, touch = objects_over(compliance), np.tile(FORCES, (3, 1)), batch.touch_object
     expected = press_layers(compliance, objects, forces)
 
-    def touch_or_fail(layer, one, forces_n):
+    def touch_or_fail(layer, one, forces_n, **options):
         if one is objects[1]:
             raise ConvergenceError("not at 3 N")
-        return touch(layer, one, forces_n)
+        return touch(layer, one, forces_n, **options)
 
     monkeypatch.setattr(batch, "touch_object", touch_or_fail)
     press, errors = batch.press_layers(compliance, objects, forces)

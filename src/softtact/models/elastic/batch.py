@@ -1,7 +1,8 @@
 """Many presses of the elastic model: one after the other on the processor, all at once on a GPU.
 
 On the processor each object has its dense compliance among its points (`compliance.touch_object`), which caches hold; the fields of
-all presses are one product, which reads the surface's compliance once.
+all presses are one product, which reads the surface's compliance once. They tell into which objects' recesses the surface bulges:
+these are pressed once more.
 
 On a GPU there is a column for each press and load step, and all share the surface, free sides included: a product uses four dense
 matrices, one for each parity, on a quarter of the surface's nodes and all columns. Only the quarter's rectangle of nodes that the
@@ -23,9 +24,9 @@ from array_api_compat import array_namespace, device
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.object_points import ObjectPoints
 from softtact.contact.undersides import PosedUnderside
-from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps, depth_on_springs, not_settled
+from softtact.contact.unilateral import LEAST_REACH_MM, ContactLoadSteps, depth_on_springs, highest_missed, not_settled
 from softtact.errors import ConvergenceError
-from softtact.models.elastic.compliance import Compliance, LayerPress, touch_object
+from softtact.models.elastic.compliance import Compliance, LayerPress, press_object, touch_object
 from softtact.models.quarter_symmetry import PARITIES
 
 _FALL = 0.1             # of a residual, before the active set is renewed
@@ -182,18 +183,37 @@ def _press_in_turn(compliance, objects, forces_n):
     grid, (presses, load_steps), errors = compliance.grid, forces_n.shape, {}
     force, gap = np.zeros((grid.count, forces_n.size)), np.full((grid.count, forces_n.size), np.inf)
     depth, iterations, settled = (np.zeros(forces_n.size, dtype=kind) for kind in (float, int, bool))
-    for number in range(presses):
-        columns = slice(number * load_steps, (number + 1) * load_steps)
-        try:
-            points, contact = touch_object(compliance, objects[number], forces_n[number])
-        except ConvergenceError as error:
-            errors[number] = error.with_traceback(None)
-            continue
+
+    def take(columns, points, contact):
         force[points.nodes, columns], gap[points.nodes, columns] = contact.force, contact.gap
         depth[columns], iterations[columns], settled[columns] = contact.depth, contact.iterations, True
+
+    of_press = [slice(number * load_steps, (number + 1) * load_steps) for number in range(presses)]
+    for number, columns in enumerate(of_press):
+        try:
+            take(columns, *touch_object(compliance, objects[number], forces_n[number], bulges=False))
+        except ConvergenceError as error:
+            errors[number] = error.with_traceback(None)
     pressed = np.flatnonzero(force.any(axis=1))
-    fields = compliance.fields(ObjectPoints.level(pressed, np.zeros(len(pressed)), grid.step), force[pressed])
+    points = ObjectPoints.level(pressed, np.zeros(len(pressed)), grid.step)
+    top = compliance.top(points, force[pressed])
+    fields = compliance.fields(points, force[pressed], top=top)
+    for number, columns in enumerate(of_press):
+        if number in errors or not _bulges(objects[number].height_mm, gap[:, columns], top[columns], depth[columns]):
+            continue
+        try:
+            points, press = press_object(compliance, objects[number], forces_n[number])
+            take(columns, points, press.contact)
+            fields[columns] = press.fields
+        except ConvergenceError as error:
+            errors[number], settled[columns], fields[columns] = error.with_traceback(None), False, 0.0
     return LayerPress(fields, ContactLoadSteps(force, depth, gap, iterations, settled), grid.areas(np.arange(grid.count))), errors
+
+
+def _bulges(height, gap, top, depth):
+    """Whether the surface, `top` (l, ny, nx) down, penetrates an object with heights (n,) where it has no gap (n, l) yet."""
+    beyond = np.where(np.isinf(gap[:, 0]), height, -np.inf)
+    return highest_missed(beyond, -np.inf, top.reshape(len(depth), -1), depth) > -np.inf
 
 
 def _press_columns(compliance, heights, forces_n, stops, device, settings):

@@ -19,7 +19,14 @@ from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
 from softtact.contact.object_points import ObjectPoints
 from softtact.contact.shell import pad_forces
 from softtact.contact.undersides import PosedUnderside
-from softtact.contact.unilateral import REACH, RISE, ContactLoadSteps, depth_on_springs, press_elastic
+from softtact.contact.unilateral import (
+    RISE,
+    ContactLoadSteps,
+    among_candidates,
+    depth_on_springs,
+    highest_missed,
+    press_elastic,
+)
 from softtact.errors import ConvergenceError
 from softtact.files import read_arrays
 from softtact.linalg.workers import on_one_thread
@@ -75,32 +82,41 @@ class Compliance:
         places = self.grid.quarter(points.nodes)
         return self.blocks.between(*places, *places)
 
-    def fields(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
-        """Deformation (l, 2 ny - 1, 2 nx - 1) in mm at all nodes, with sides that are held, of forces (c, l) in N at points."""
-        return self._fields(self.blocks, points, force)
+    def top(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
+        """How far the grid's nodes are down (l, ny, nx) in mm under forces (c, l) in N at points."""
+        return np.ascontiguousarray(self._moved(self.blocks, points, force))
+
+    def fields(self, points: ObjectPoints, force: np.ndarray, *, top: np.ndarray | None = None) -> np.ndarray:
+        """Deformation (l, 2 ny - 1, 2 nx - 1) in mm at all nodes, with sides that are held, of forces (c, l) in N at points.
+
+        top: what `top` gives for these, if it is known
+        """
+        return self._everywhere(self.top(points, force) if top is None else top)
 
     def lower_fields(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray | None:
         """Deformation of the lower side; None if it is fixed."""
-        return None if self.lower is None else self._fields(self.lower, points, force)
+        return None if self.lower is None else self._everywhere(self._moved(self.lower, points, force))
 
     def thinning(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
         """By how much the layer is thinner at the nodes of `fields`."""
         fields, lower = self.fields(points, force), self.lower_fields(points, force)
         return fields if lower is None else fields - lower
 
-    def _fields(self, blocks, points, force):
+    def _moved(self, blocks, points, force):
         quarter = tuple(count // 2 + 1 for count in self.grid.shape)
-        inner = blocks.fields(quarter, *self.grid.quarter(points.nodes), force)
-        return self.grid.with_held_sides(inner.astype(float))
+        return blocks.fields(quarter, *self.grid.quarter(points.nodes), force).astype(float)
+
+    def _everywhere(self, inner):
+        return self.grid.with_held_sides(inner)
 
 
 @dataclass(frozen=True)
 class InnerPlaneCompliance(Compliance):
     """A `Compliance` whose fields are of a plane inside the layer, to which its `lower` belongs; contact is that of the top."""
 
-    def fields(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
-        """Deformation (l, 2 ny - 1, 2 nx - 1) in mm of the plane at all nodes."""
-        return self._fields(self.lower, points, force)
+    def fields(self, points: ObjectPoints, force: np.ndarray, *, top: np.ndarray | None = None) -> np.ndarray:
+        """Deformation (l, 2 ny - 1, 2 nx - 1) in mm of the plane at all nodes, whatever the `top` is."""
+        return self._everywhere(self._moved(self.lower, points, force))
 
     def lower_fields(self, points: ObjectPoints, force: np.ndarray) -> None:
         """None: the layer's lower side is fixed."""
@@ -114,10 +130,10 @@ class DraftCompliance(Compliance):
     nodes: tuple[int, int] = (0, 0)
     """(2 ny - 1, 2 nx - 1) of the whole grid, with sides that are held."""
 
-    def _fields(self, blocks, points, force):
+    def _everywhere(self, inner):
         from scipy.interpolate import RectBivariateSpline
 
-        coarse = super()._fields(blocks, points, force)
+        coarse = super()._everywhere(inner)
         over = [(fine - 1) / (few - 1) for fine, few in zip(self.nodes, coarse.shape[1:], strict=True)]
         places = [np.arange(fine) / share for fine, share in zip(self.nodes, over, strict=True)]
         return np.stack([RectBivariateSpline(*map(np.arange, one.shape), one)(*places) for one in coarse])
@@ -263,7 +279,8 @@ class LayerPress:
 def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence[float] | np.ndarray, *,
                 patches: bool = False) -> LayerPress:
     """Press `ObjectPoints` of the compliance's grid with forces (l,) in N; patches: as for `press_object`."""
-    return _with_fields(compliance, points, _contact_among(compliance, points, patches)(forces_n))
+    contact = _contact_among(compliance, points, patches)(forces_n)
+    return _with_fields(compliance, points, contact, compliance.top(points, contact.force))
 
 
 @on_one_thread
@@ -274,29 +291,45 @@ def press_object(compliance: Compliance, underside: PosedUnderside, forces_n: np
     patches: let four level points inside a large contact share a pressure (`patches_of`): two thirds of the time, readings within
     0.1 %. Raises ConvergenceError.
     """
-    points, contact = touch_object(compliance, underside, forces_n, patches=patches)
-    return points, _with_fields(compliance, points, contact)
+    points, contact, top = _touch(compliance, underside, forces_n, patches, bulges=True)
+    return points, _with_fields(compliance, points, contact, top)
 
 
 @on_one_thread
 def touch_object(compliance: Compliance, underside: PosedUnderside, forces_n: np.ndarray, *,
-                 patches: bool = False) -> tuple[ObjectPoints, ContactLoadSteps]:
+                 bulges: bool = True) -> tuple[ObjectPoints, ContactLoadSteps]:
     """The contact of `press_object` and its points.
 
+    bulges: whether the surface may bulge into a recess of the object far above its depth; if not, `highest_missed` of the surface's
+    displacement tells whether it does
+    """
+    return _touch(compliance, underside, forces_n, False, bulges)[:2]
+
+
+def _touch(compliance, underside, forces_n, patches, bulges):
+    """The contact, its points, and how far all nodes (l, ny, nx) are down, or None if the surface does not bulge.
+
     The layer is stiffer than springs side by side, so points within the reach of these are enough; if the object gets deeper all
-    the same, more points are taken. Beside the object the surface rises, so points slightly above the depth can touch, too.
+    the same, more points are taken. Beside the object the surface rises, so points slightly above the depth can touch, too; and
+    in a recess of the object, into which a nearly incompressible layer bulges, points far above it.
     """
     grid, height = compliance.grid, underside.height_mm
-    lowest, there = min(underside.touch_mm, float(height.min())), int((height < NO_CONTACT_MM).sum())
+    lowest, below = min(underside.touch_mm, float(height.min())), height < NO_CONTACT_MM
     on_springs = depth_on_springs(height, grid.areas(np.arange(grid.count)), forces_n[-1] / compliance.foundation_modulus)
-    reach = RISE * (on_springs - lowest)
-    while True:
-        nodes = np.flatnonzero((height <= lowest + reach) & (height < NO_CONTACT_MM))
+    over = height - lowest
+
+    def solve(reach):
+        nodes = np.flatnonzero((over <= reach) & below)
         points = ObjectPoints.level(nodes, height[nodes], grid.step)
         contact = _on_pad(_contact_among(compliance, points, patches), points, forces_n, underside)
-        if len(nodes) == there or RISE * (contact.depth[-1] - lowest) <= reach:
-            return points, contact
-        reach *= REACH
+        return points, contact, compliance.top(points, contact.force) if bulges else None
+
+    def needed(found, reach):
+        _, contact, top = found
+        depth = contact.depth - lowest
+        return max(RISE * depth[-1], highest_missed(over, reach, top.reshape(len(depth), -1), depth) if bulges else 0.0)
+
+    return among_candidates(solve, needed, reach_mm=RISE * (on_springs - lowest), most_mm=float(over[below].max()))
 
 
 def _on_pad(press, points, forces_n, underside):
@@ -335,6 +368,6 @@ def _contact_among(compliance, points, patches):
     return press
 
 
-def _with_fields(compliance, points, contact):
-    return LayerPress(fields=compliance.fields(points, contact.force), contact=contact, areas=compliance.grid.areas(points.nodes),
-                      lower_fields=compliance.lower_fields(points, contact.force))
+def _with_fields(compliance, points, contact, top):
+    return LayerPress(fields=compliance.fields(points, contact.force, top=top), contact=contact,
+                      areas=compliance.grid.areas(points.nodes), lower_fields=compliance.lower_fields(points, contact.force))

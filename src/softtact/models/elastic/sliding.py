@@ -19,7 +19,7 @@ import numpy as np
 from softtact.contact.coulomb import ContactCompliance, CoulombSettings, Increment, solve_increment
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.motion import Motion, MotionStep
-from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE, depth_on_springs
+from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE, among_candidates, depth_on_springs, highest_missed
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.tangential import SurfaceCompliance
 
@@ -120,17 +120,30 @@ class SlidingObject:
         if (heights[allowed] < self.deepest_mm).any():
             heights = np.where(allowed, heights, NO_CONTACT_MM)
         reach = REACH * max(self._expected_depth(heights, load) if depth is None else depth, state.position[2]) + LEAST_REACH_MM
-        while True:
-            nodes = np.flatnonzero(heights < min(reach, self.deepest_mm))
+
+        def solve(reach):
+            nodes = np.flatnonzero(heights < reach)
             if not len(nodes):
                 return self._free(state, depth)
             among, spread = self._operators_of(nodes)
             carried = state.moved[nodes] + self._share_in_contact(state, among, nodes, heights, place, expected)[:, None] * way
             contact = solve_increment(among, Increment(heights[nodes], carried, self.friction, depth, load),
                                       normal=state.normal[nodes], tangential=state.tangential[nodes], settings=self.settings)
-            if reach >= self.deepest_mm or RISE * contact.depth <= reach:
-                return _Found(nodes, contact, heights[nodes], *spread(contact), contact.depth)
-            reach *= REACH
+            return _Found(nodes, contact, heights[nodes], *spread(contact), contact.depth)
+
+        def needed(found, reach):
+            return reach if found.contact is None else max(RISE * found.depth, self._highest_missed(found, heights, reach))
+
+        return among_candidates(solve, needed, reach_mm=reach, most_mm=self.deepest_mm)
+
+    def _highest_missed(self, found, heights, reach):
+        """Height in mm of the highest node beyond a reach where the surface bulges into the object; the reach if there is none."""
+        nodes, touching, acting = np.flatnonzero((heights >= reach) & (heights < self.deepest_mm)), found.touching, found.acting
+        if not len(nodes) or not len(touching):
+            return reach
+        force = np.column_stack([found.contact.tangential, found.contact.normal])[acting]
+        down = self.compliance.between(nodes, touching, row_axes=(2,), dtype=np.float32) @ force
+        return highest_missed(heights[nodes], -np.inf, down.T, np.array([found.depth]))
 
     def _share_in_contact(self, state, among, nodes, heights, place, depth):
         """The share (c,) of an increment in which a node touches: 1 for those that did, for others from where their gap closes."""
