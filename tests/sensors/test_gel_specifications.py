@@ -66,3 +66,10 @@ def test_an_assumed_number_without_a_reason_is_refused():
     layer = {"young_mpa": {"value": 0.4, "assumed": True}, "poisson": 0.49}
     with pytest.raises(InputError, match=r"'elastic_layer.young_mpa' is not usable: .*an assumed value needs a reason"):
         spec_from_dict(values_of("digit", elastic_layer=layer))
+
+
+@pytest.mark.parametrize("name", ["digit", "sheet"])
+@pytest.mark.parametrize("shape", [[1, 1], [1, 41]])
+def test_a_map_of_a_single_point_along_a_side_is_refused(name, shape):
+    with pytest.raises(InputError, match=r"at 'map_shape': \[1, .* has a side with a single point"):
+        spec_from_dict(values_of(name, map_shape=shape))

@@ -23,6 +23,7 @@ from softtact.sensors.fields import (
 from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 DEFAULT_KIND = "frusta"     # of a file that states none
+_FEWEST_HELD = 7      # points of a map along a side that is held: the elastic model's stencil takes three elements of a quarter
 FILES_OF_READOUTS = ("shading", "background")     # keys of readouts that name files
 
 
@@ -224,6 +225,9 @@ class BaseSpec(Specification):
         if kind in ("elastic", "foundation") and not self.edge.far and not all(count % 2 for count in self.map_shape):
             raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
                              "models need; write odd numbers.")
+        if kind == "elastic" and self.edge.held_below_mm == 0 and min(self.map_shape) < _FEWEST_HELD:
+            raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has fewer than {_FEWEST_HELD} points along a "
+                             "side, which the elastic model needs where the edge holds the sides; write larger odd numbers.")
 
     @property
     def has_layers(self) -> bool:
@@ -244,6 +248,9 @@ class BaseSpec(Specification):
 
     def _check(self, where: str) -> None:
         super()._check(where)
+        if min(self.map_shape) < 2:
+            raise InputError(f"{where}, at 'map_shape': {list(self.map_shape)} has a side with a single point, and a map has "
+                             "points on opposite sides of the sensor; write at least 3.")
         below = self.edge.held_below_mm
         if np.isfinite(below) and below >= self.held_height_mm:
             raise InputError(f"{where}, at 'edge.held.sides_below_mm': {below:g} mm is not less than the height of the layers, "

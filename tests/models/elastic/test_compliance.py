@@ -7,12 +7,15 @@ from support.sensors import CORO
 from whole_layer import WholeLayer
 
 from softtact.contact.height_field import HeightField
+from softtact.contact.object_points import ObjectPoints
 from softtact.contact.underside import Underside
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import (
     Compliance,
+    draft_cells,
+    draft_of,
     elastic_compliance,
     elastic_slab,
     electrode_plane_compliance,
@@ -113,6 +116,21 @@ def test_saved_and_loaded_it_presses_the_same(compliance, tmp_path):
 def test_a_map_without_a_middle_is_refused():
     with pytest.raises(InputError, match="has no middle row and column"):
         map_cells(SMALL.model_copy(update={"map_shape": (13, 12)}))
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (5, 5), (3, 41)])
+def test_a_map_too_small_for_sides_that_are_held_is_refused(shape):
+    few = SMALL.model_copy(update={"map_shape": shape, "edge": Edge(held="sides")})
+    with pytest.raises(InputError, match="at 'map_shape': .* has fewer than 7 points along a side"):
+        elastic_compliance(few)
+
+
+@pytest.mark.parametrize("count", [7, 9, 11])
+def test_a_draft_of_a_small_map_whose_sides_are_held_has_the_maps_shape(count):
+    small = SMALL.model_copy(update={"map_shape": (count, count), "edge": Edge(held="sides")})
+    draft = draft_of(small, elastic_compliance(small, cells=draft_cells(small)))
+    fields = draft.fields(ObjectPoints.level(np.array([draft.grid.count // 2]), np.zeros(1), draft.grid.step), np.ones((1, 1)))
+    assert fields.shape == (1, 2 * count - 1, 2 * count - 1) and fields.max() == fields[0, count - 1, count - 1] > 0
 
 
 def test_the_foundation_modulus_is_the_confined_modulus_over_the_thickness(compliance):

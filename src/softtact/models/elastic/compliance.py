@@ -147,8 +147,10 @@ def draft_of(spec: BaseSpec, compliance: Compliance) -> DraftCompliance:
 
 
 def draft_cells(spec: BaseSpec) -> tuple[int, ...]:
-    """Elements along a quarter's sides of a `DraftCompliance`: half as many, so nodes lie at the map's points."""
-    return tuple(max(2, count // 2) for count in map_cells(spec))
+    """Elements along a quarter's sides of a `DraftCompliance`: half as many, so nodes lie at the map's points, but at least three,
+    which the stencil takes where the sides are held.
+    """
+    return tuple(max(3, count // 2) for count in map_cells(spec))
 
 
 def map_cells(spec: BaseSpec) -> tuple[int, ...]:
