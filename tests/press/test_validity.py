@@ -7,6 +7,7 @@ from support.bodies import COARSE, SMALL
 from support.laws import LAWS
 
 from softtact.errors import ConvergenceError
+from softtact.models.elastic.compliance import elastic_compliance
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
 from softtact.press.validity import flags_elastic, flags_foundation, flags_hyperelastic, reasons
@@ -14,6 +15,8 @@ from softtact.press.validity import flags_elastic, flags_foundation, flags_hyper
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
         "rough": [False, False, False], "volume_ratio": [0.9, 0.5, np.nan], "depth_mm": [0.1, 0.2, 0.3],
         "forces_n": [5.0, 20.0, 50.0]}
+
+MANY = np.full(3, 40)     # points that carry the object
 
 
 def valid(**changed):
@@ -48,23 +51,41 @@ def test_load_steps_that_do_not_grow_with_the_force_are_flagged(depth, expected)
 
 
 def test_elastic_load_steps_hold_to_half_of_the_layer():
-    flags = flags_elastic(np.array([0.1, 1.24, 1.26]), np.ones((3, 9, 9)), thickness_mm=2.5, dielectric_mm=1.0)
+    flags = flags_elastic(np.array([0.1, 1.24, 1.26]), np.ones((3, 9, 9)), MANY, thickness_mm=2.5, dielectric_mm=1.0)
     assert holds(flags) == [True, True, False]
 
 
 def test_foundation_load_steps_hold_within_their_law_and_what_was_compared():
     compression = np.array([0.05, 0.164, 0.166])
     sensor, hardly = {"frustum_mm": 0.5, "thickness_mm": 2.0}, np.zeros(3)
-    assert holds(flags_foundation(compression, hardly, **sensor, law_limit_mm=1.0)) == [True, True, False]    # 0.33 of 0.5 mm
-    assert holds(flags_foundation(compression, hardly, **sensor, law_limit_mm=0.07)) == [True, False, False]
+    assert holds(flags_foundation(compression, hardly, MANY, **sensor, law_limit_mm=1.0)) == [True, True, False]    # 0.33 of 0.5 mm
+    assert holds(flags_foundation(compression, hardly, MANY, **sensor, law_limit_mm=0.07)) == [True, False, False]
     deep = np.array([0.99, 1.01, 0.5])      # half of the layer
-    assert holds(flags_foundation(hardly, deep, **sensor, law_limit_mm=1.0)) == [True, False, True]
+    assert holds(flags_foundation(hardly, deep, MANY, **sensor, law_limit_mm=1.0)) == [True, False, True]
+
+
+@pytest.mark.parametrize("flags_of", [
+    lambda points: flags_elastic(np.zeros(3), np.zeros((3, 9, 9)), points, thickness_mm=2.5, dielectric_mm=1.0),
+    lambda points: flags_foundation(np.zeros(3), np.zeros(3), points, frustum_mm=0.5, thickness_mm=2.0, law_limit_mm=1.0)])
+def test_less_than_nine_points_on_a_pad_do_not_resolve_a_contact_but_none_is_no_contact(flags_of):
+    words = "fewer than 9 points of the surface carry the object, which is finer than these"
+    assert reasons(flags_of(np.array([0, 8, 9])), 3).tolist() == ["", words, ""]
+
+
+def test_a_small_ball_whose_depth_changes_with_its_place_between_the_nodes_is_flagged():
+    """On nodes 0.3 mm apart; a larger ball under the same force is resolved."""
+    sensor = Sensor(SMALL, LAWS, prepared_models={"elastic": elastic_compliance(SMALL)})
+    for radius, valid_steps in ((0.5, [0, 0]), (5.0, [1, 1])):
+        ball = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+        pressed = sensor.press(ball, force_n=[0.1, 0.15], model="elastic", label="")
+        moved = sensor.press(ball, motion="fz -0.1; x 0.05; x 0.05", model="elastic", label="")
+        assert pressed.within_validity.tolist() == valid_steps and (moved.within_validity == valid_steps[0]).all()
 
 
 def test_a_flagged_load_step_names_its_limits_and_all_of_its_reasons():
     narrow = np.zeros((3, 9, 9))
     narrow[:, 4] = 0.6
-    flags = flags_elastic(np.array([0.6, 1.3, 1.3]), narrow * [[[1]], [[1]], [[0.5]]], thickness_mm=2.5, dielectric_mm=1.0)
+    flags = flags_elastic(np.array([0.6, 1.3, 1.3]), narrow * [[[1]], [[1]], [[0.5]]], MANY, thickness_mm=2.5, dielectric_mm=1.0)
     deep = "the object is deeper in than 1.25 mm, half of the linear layer"
     thin = "a wall or pin narrower than three points of the surface is deeper in than 0.5 mm, half of the dielectric"
     assert reasons(flags, 3).tolist() == [thin, f"{deep}; {thin}", deep]

@@ -161,7 +161,8 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
                        pad_force_n=_snapped(forces, contact.force.sum(axis=0)),
                        contact_area_mm2=press.areas @ (contact.force > 0),
                        penetration_mm=contact.penetration,
-                       flags=flags_elastic(depth, press.fields, thickness_mm=sensor.spec.thickness_mm,
+                       flags=flags_elastic(depth, press.fields, (contact.force > 0).sum(axis=0),
+                                           thickness_mm=sensor.spec.thickness_mm,
                                            dielectric_mm=sensor.spec.dielectric_thickness_mm),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
                        felt_mm=felt, iterations=contact.iterations)
@@ -234,7 +235,8 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
     area, count = points.covered * compliance.grid.areas(points.nodes), len(load_steps)
     compression = np.array([load_step.compression.max() for load_step in load_steps])
     depth = np.array([load_step.depth for load_step in load_steps]) - touch_mm
-    flags = flags_foundation(compression, depth, frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+    touching = np.array([load_step.touching.sum() for load_step in load_steps])
+    flags = flags_foundation(compression, depth, touching, frustum_mm=sensor.spec.dielectric.frusta.height_mm,
                              thickness_mm=sensor.spec.thickness_mm, law_limit_mm=compliance.law.limit_mm)
     unknown = np.full(count, np.nan)
     numbers = {"indentation_mm": depth, "pad_force_n": [load_step.force_n for load_step in load_steps],
@@ -328,7 +330,7 @@ def _of_motion(sensor, moved, seconds, placed, motion):
     result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
                          np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
                          felt_mm=felt_displacement(sensor.spec, moved.sunk_mm),
-                         flags=flags_elastic(moved.depth_mm, moved.sunk_mm, thickness_mm=sensor.spec.thickness_mm,
+                         flags=flags_elastic(moved.depth_mm, moved.sunk_mm, moved.points, thickness_mm=sensor.spec.thickness_mm,
                                              dielectric_mm=sensor.spec.dielectric_thickness_mm),
                          frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown, plane=plane,
                          seen_object=followed, **{name: getattr(moved, name) for name in _OF_MOTION})

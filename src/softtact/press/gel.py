@@ -20,7 +20,7 @@ from softtact.models.elastic.wide_sliding import WideObject, WideStep
 from softtact.press.making import make_result
 from softtact.press.result import PressResult
 from softtact.press.task import RunControl
-from softtact.press.validity import Flags
+from softtact.press.validity import Flags, few_points
 from softtact.progress import Watch
 from softtact.readout.registry import PlaneMotion
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
     from softtact.sensors.base import BaseSpec
 
-_FEWEST_POINTS = 9      # of the map, under the object: fewer do not resolve the contact of a spike
 _DEEPEST = 0.5          # of the gel's thickness: docs/explanation/gels.md compares with the solid model
 _LOW_MM = 0.02          # what is so little above the lowest point counts as where the object first touches
 
@@ -110,8 +109,7 @@ def _flags(spec: "BaseSpec", steps: Sequence[WideStep], depth: np.ndarray, touch
     deepest = _DEEPEST * spec.thickness_mm
     return {f"the object is deeper in than {deepest:.3g} mm, {_DEEPEST:g} of the linear gel": ~(depth <= deepest),
             "the object touches the rim of the gel, beyond which the model has none": np.array([step.at_rim for step in steps]),
-            f"fewer than {_FEWEST_POINTS} points of the map carry the object, which is finer than these":
-                (touching > 0) & (touching < _FEWEST_POINTS)}
+            **few_points(touching, of="map")}
 
 
 def _refuse_leaving(spec: "BaseSpec", surface: HeightField, touch: float, motion: Motion) -> None:

@@ -292,6 +292,8 @@ class ElasticMotion:
     """(step, y, x): along z from the surface to the object; inf where no object is above."""
     contact_area_mm2: np.ndarray
     """(step,): area of the nodes under pressure."""
+    points: np.ndarray
+    """(step,): how many nodes are under pressure."""
     penetration_mm: np.ndarray
     """(step,): deepest overlap."""
     iterations: np.ndarray
@@ -407,6 +409,7 @@ def _result(mover, states, counts):
         force_n=forces, torque_nmm=np.stack([_torque(grid, state) for state in ends]),
         slip=np.stack([_slip_map(grid, state) for state in ends]),
         contact_area_mm2=np.array([grid.areas(np.flatnonzero(state.normal > 0)).sum() for state in ends]),
+        points=np.array([(state.normal > 0).sum() for state in ends]),
         penetration_mm=np.array([state.penetration_mm for state in ends]),
         iterations=np.diff([state.turns for state in states]), increments=np.array(counts),
         **{name: np.array([getattr(state, name) for state in ends]) for name in ("dissipated_mj", "stored_mj", "work_mj")})
