@@ -13,9 +13,8 @@ from softtact.press.sensor import Sensor
 from softtact.press.validity import flags_elastic, flags_foundation, flags_hyperelastic, reasons
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
-        "rough": [False, False, False], "volume_ratio": [0.9, 0.5, np.nan], "depth_mm": [0.1, 0.2, 0.3],
-        "forces_n": [5.0, 20.0, 50.0]}
-
+        "rough": [False, False, False], "residual_n": [0.09, 0.1, 0.1], "volume_ratio": [0.9, 0.5, np.nan],
+        "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}
 MANY = np.full(3, 40)     # points that carry the object
 
 
@@ -36,7 +35,7 @@ def test_all_load_steps_of_a_good_press_hold():
 
 @pytest.mark.parametrize("changed", [
     {"compression_mm": [0.1, 0.2, 0.41]}, {"contact_error_mm": [0.0, 0.001, 0.0031]}, {"points": [9, 40, 8]},
-    {"rough": [False, False, True]}, {"volume_ratio": [0.9, 0.01, 0.0]}])
+    {"rough": [False, False, True]}, {"residual_n": [0.1, 0.1, 1.1]}, {"volume_ratio": [0.9, 0.01, 0.0]}])
 def test_each_criterion_flags_its_own_load_step_alone(changed):
     assert valid(**changed) == [True, True, False]
 
@@ -118,6 +117,19 @@ def test_a_press_flags_a_load_step_that_is_balanced_roughly(monkeypatch, rough_a
     result = Sensor(SMALL, LAWS, mesh=COARSE, solver=solver).press(trimesh.creation.icosphere(subdivisions=3, radius=4.0),
                                                                    force_n=[10.0], model="hyperelastic")
     assert result.within_validity[0] == expected
+
+
+def test_a_step_without_a_force_has_no_residual_that_is_a_share_of_it():
+    assert valid(forces_n=[0.0, 20.0, 50.0], residual_n=[0.003, 0.1, 0.1]) == [True, True, True]
+
+
+def test_a_force_of_which_the_solver_leaves_more_than_a_fiftieth_is_flagged():
+    """The tolerance of the residual is that of 10 N for all smaller forces: 3 mN."""
+    box = trimesh.creation.box((3.0, 3.0, 2.0))
+    result = Sensor(SMALL, LAWS, mesh=COARSE).press(box, force_n=[0.003, 3.0], model="hyperelastic", label="")
+    share = result.residual_n / result.normal_force_n
+    assert share[0] > 0.02 > share[1] and result.within_validity.tolist() == [0, 1]
+    assert "the force is so small that the residual is above 2% of it" in result.validity_reason[0]
 
 
 def test_depths_may_fall_where_the_force_does_not_grow():

@@ -138,7 +138,8 @@ class _Record:
         _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
         flags = flags_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                    contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
-                                   rough=numbers.pop("rough"), volume_ratio=numbers["least_volume_ratio"],
+                                   rough=numbers.pop("rough"), residual_n=numbers["residual_n"],
+                                   volume_ratio=numbers["least_volume_ratio"],
                                    frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                    allowed_mm=sensor.solver.largest_penetration_mm)
         made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(times),
