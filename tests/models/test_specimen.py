@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.models.hyperelastic.mesh_settings import MeshSettings, frustum_scatter, mesh_settings, newton_settings, specimen_of
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.meshes import layered_mesh
+from softtact.studies.hybrid.keys import Mesh
 
 SCATTER = {"height_scatter": 0.01, "tip_scatter": 0.02, "thickness_scatter": 0.02, "specimen": 7}
 
@@ -57,3 +59,29 @@ def test_the_mesh_of_a_specimen_has_its_thickness():
     nominal, specimen = (layered_mesh(small, values).points[:, 2] for values in ({}, SCATTER | {"height_scatter": 0.0}))
     wanted = sum(thicknesses(specimen_of(small, SCATTER))) - sum(thicknesses(small))
     assert abs(wanted) > 1e-3 and np.ptp(specimen) - np.ptp(nominal) == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize(("values", "said"), [
+    ({"cover_heights": [0, 0.5, 0.9]}, r"cover_heights is \(0, 0\.5, 0\.9\); give shares of the height that rise from 0 to 1"),
+    ({"cover_heights": [0, 0.6, 0.5, 1]}, "cover_heights is .* that rise from 0 to 1"),
+    ({"frustum_heights": [0.2, 0.6, 1]}, "frustum_heights is .* that rise from 0 to 1"),
+    ({"frustum_heights": [0, float("nan"), 1]}, "frustum_heights is .* that rise from 0 to 1"),
+    ({"cover_heights": 5}, "cover_heights is 5; give shares"), ({"cover_splits": 1}, "cover_splits is 1; give a list"),
+    ({"far_pitches": 3}, "far_pitches is 3; use 1, 2 or 4")])
+def test_a_mesh_that_would_be_another_sensor_is_refused(values, said):
+    with pytest.raises(InputError, match=f"mesh: {said}"):
+        mesh_settings(values)
+
+
+@pytest.mark.parametrize("key", ["height_scatter", "tip_scatter", "thickness_scatter"])
+@pytest.mark.parametrize("value", [0.4, -0.1, "much"])
+def test_a_scatter_that_turns_sizes_over_is_refused(key, value):
+    with pytest.raises(InputError, match=f"mesh: {key} is .*; give a standard deviation .* from 0 to below 0.4"):
+        layered_mesh(CORO, {key: value})
+
+
+@pytest.mark.parametrize("values", [{"cover_heights": [0, 0.5, 0.9]}, {"frustum_heights": [1.0]}, {"height_scatter": 0.4}])
+def test_the_key_of_a_study_refuses_the_same(values):
+    assert Mesh(cover_heights=[0, 0.5, 1], height_scatter=0.1).height_scatter == 0.1
+    with pytest.raises(ValidationError):
+        Mesh(**values)

@@ -122,7 +122,7 @@ def test_layers_without_a_number_of_splits_are_bound():
 
 def test_splits_for_no_layer_or_too_many_are_refused():
     for splits in [(), (1, 1, 1, 2)]:
-        with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
+        with pytest.raises(InputError, match="cover_splits has . entries for the 3 layers"):
             MeshSettings(cover_heights=THREE, cover_splits=splits)
 
 

@@ -1,7 +1,9 @@
 """Resolution of the layered body, settings of Newton's method, and the scatter of one specimen's sizes about the drawing's."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,8 @@ _OBJECT_SMOOTHING_MM = 1e-3
 _CORE_IN_ONE_RING = 0.6     # docs/notebook/2026-11-24-choice-of-the-meshes.md
 SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
 _LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
+LARGEST_SCATTER = 1 / _LARGEST_DEVIATION     # from which a frustum of the largest deviation would have no height, or no tip
+_FAR_PITCHES = (1, 2, 4)
 _SOLVER_KEYS = ("largest_penetration_mm", "relative_tolerance")
 
 
@@ -57,12 +61,19 @@ class MeshSettings:
     contact_stiffness: float = 3000.0
 
     def __post_init__(self):
+        for name in ("cover_heights", "frustum_heights"):
+            _check_heights(name, getattr(self, name))
+        if self.far_pitches not in _FAR_PITCHES:
+            raise InputError(f"mesh: far_pitches is {self.far_pitches!r}; use 1, 2 or 4.")
+        if not isinstance(self.cover_splits, Sequence):
+            raise InputError(f"mesh: cover_splits is {self.cover_splits!r}; give a list with a number for each of the uppermost "
+                             "layers.")
         if not 1 <= len(self.cover_splits) <= len(self.cover_heights) - 1:
-            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_heights) - 1} layers of "
-                             "cover_heights; give a number for each, or for the uppermost ones")
+            raise InputError(f"mesh: cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_heights) - 1} "
+                             "layers of cover_heights; give a number for each, or for the uppermost ones.")
         if self.cover_splits[0] > 1:
-            raise ValueError(f"cover_splits begins with {self.cover_splits[0]}; give 0 or 1: the nodes of a layer that is finer "
-                             "than the one below are not tied to it, and the map is wrong by up to a third")
+            raise InputError(f"mesh: cover_splits begins with {self.cover_splits[0]}; give 0 or 1: the nodes of a layer that is "
+                             "finer than the one below are not tied to it, and the map is wrong by up to a third.")
 
     @property
     def core(self) -> float:
@@ -127,6 +138,13 @@ class MeshSettings:
         return cls(quartic_penalty_ratio=400.0, slab_quartic_penalty_ratio=10.0)
 
 
+def _check_heights(name, values):
+    """Refuse heights of element layers that do not rise from 0 to 1."""
+    numbers = isinstance(values, Sequence | np.ndarray) and all(isinstance(value, Real) for value in values)
+    if not numbers or len(values) < 2 or (values[0], values[-1]) != (0, 1) or not all(low < high for low, high in pairwise(values)):
+        raise InputError(f"mesh: {name} is {values!r}; give shares of the height that rise from 0 to 1, as (0, 0.5, 1).")
+
+
 @dataclass(frozen=True)
 class NewtonSettings:
     """Convergence criteria of a load step, and limits of Newton's method.
@@ -186,15 +204,24 @@ def frustum_scatter(spec: SensorSpec, values: Mapping[str, Any]) -> tuple[np.nda
     """Factors (heights, tip diameters) of a specimen's frusta, each near 1; None if no scatter is requested."""
     if not any(key in values for key in SCATTER_KEYS):
         return None
+    for key in ("height_scatter", "tip_scatter"):
+        _check_scatter(key, values.get(key, 0.0))
     count = int(np.prod(spec.frusta_counts))
     rng = np.random.default_rng(int(values.get("specimen", 0)))
     heights, tips = rng.standard_normal((2, count)).clip(-_LARGEST_DEVIATION, _LARGEST_DEVIATION)
     return 1 + values.get("height_scatter", 0.0) * heights, 1 + values.get("tip_scatter", 0.0) * tips
 
 
+def _check_scatter(key, value):
+    if not (isinstance(value, Real) and 0 <= value < LARGEST_SCATTER):
+        raise InputError(f"mesh: {key} is {value!r}; give a standard deviation as a share of the size, from 0 to below "
+                         f"{LARGEST_SCATTER:g}, with which nothing turns over.")
+
+
 def specimen_of(spec: SensorSpec, values: Mapping[str, Any]) -> SensorSpec:
     """The sensor with the thickness of sheet and cover of one specimen; the frusta's scatter is `frustum_scatter`'s."""
     scatter = values.get("thickness_scatter", 0.0)
+    _check_scatter("thickness_scatter", scatter)
     if not scatter:
         return spec
     sheet, cover = 1 + scatter * np.random.default_rng([int(values.get("specimen", 0)), 1]).standard_normal(2).clip(
@@ -217,11 +244,8 @@ def mesh_settings(values: Mapping[str, Any]) -> MeshSettings:
     unknown = sorted(set(own) - set(MeshSettings.__dataclass_fields__))
     if unknown:
         raise InputError(f"mesh: key {unknown[0]!r} is unknown; use one of {', '.join(MeshSettings.__dataclass_fields__)}.")
-    try:
-        changes = {key: tuple(value) if isinstance(value, list) else value for key, value in own.items()}
-        return replace(_preset(values)[0](), **changes)
-    except ValueError as problem:
-        raise InputError(f"mesh: {problem}.") from None
+    changes = {key: tuple(value) if isinstance(value, list) else value for key, value in own.items()}
+    return replace(_preset(values)[0](), **changes)
 
 
 def newton_settings(values: Mapping[str, Any]) -> NewtonSettings:

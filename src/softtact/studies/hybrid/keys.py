@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, field_va
 
 from softtact.learning.settings import LearningCurve, Network, Repeats, Search, Ssim, Training
 from softtact.materials.laws.registry import LAWS
+from softtact.models.hyperelastic.mesh_settings import LARGEST_SCATTER
 from softtact.published.archive import ARRANGEMENTS
 from softtact.readout.virtual_sensor import VirtualSensorSettings
 from softtact.sensors.specification import ORIENTATIONS
@@ -33,11 +34,19 @@ def _rising(values):
     return values
 
 
+def _from_0_to_1(values):
+    if (values[0], values[-1]) != (0, 1):
+        raise ValueError("the values must rise from 0 to 1")
+    return _rising(values)
+
+
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)]
 ForcesFromZero = Annotated[list[NotNegative], Field(min_length=1), AfterValidator(_rising)]
+Heights = Annotated[list[float], Field(min_length=2), AfterValidator(_from_0_to_1)]
+Scatter = Annotated[float, Field(ge=0.0, lt=LARGEST_SCATTER)]
 Law = _one_of(LAWS, kind="law")
 FrustumOrientation = _one_of(ORIENTATIONS, kind="orientation")
 Arrangement = _one_of(ARRANGEMENTS, kind="arrangement")
@@ -57,7 +66,7 @@ class Camera(Section):
 class GlassMesh(Section):
     """Resolution of the frustum on glass; what is not stated is the default for its shape."""
 
-    frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+    frustum_heights: Heights | None = Field(
         None, description="heights of its layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around its core, thin at its rim")
     refinement: Annotated[int, Field(ge=0)] | None = Field(None, description="how often all elements are split in the plane")
@@ -161,13 +170,13 @@ class Mesh(Section):
     preset: Literal["default", "draft", "stable", "fine"] | None = Field(
         None, description="mesh and tolerances; the other keys override them (docs/explanation/discretisation.md)")
     sheet_layers: PositiveInt | None = None
-    cover_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+    cover_heights: Heights | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
     cover_splits: list[Annotated[int, Field(ge=0, le=5)]] | None = Field(
         None, description="for each of the uppermost layers, how often its elements, one pitch wide, are split under the object "
                           "and at its edges; lower layers, without a number here, keep the sheet's 2-D mesh")
     far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
-    frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+    frustum_heights: Heights | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
     frustum_core: Annotated[float, Field(ge=0.3, le=0.8)] | None = Field(
@@ -187,8 +196,8 @@ class Mesh(Section):
         None, description="larger penetrations are reduced by augmented Lagrange iterations")
     relative_tolerance: Annotated[float, Field(gt=0, le=0.01)] | None = Field(
         None, description="largest unbalanced nodal force as a share of the force; 0.001 changes the map by 0.1 % (rms)")
-    height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
-    tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
+    height_scatter: Scatter | None = Field(None, description="standard deviation, share of the height")
+    tip_scatter: Scatter | None = Field(None, description="standard deviation, share of the tip's diameter")
     thickness_scatter: Annotated[float, Field(ge=0, le=0.1)] | None = Field(
         None, description="the same of sheet and cover, one thickness each for a specimen")
     specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")
