@@ -184,6 +184,22 @@ def test_an_object_that_slides_off_under_its_load_is_reported(surface):
         move(surface, standing(PUNCH), Motion().press(force_n=1.0).slide(x_mm=8.0), friction=0.0)
 
 
+def test_an_object_whose_load_takes_it_through_the_layer_beside_the_pads_side_has_left_the_sensor(surface):
+    """Of a pad that ends at 4.8 mm; at x 8.6 what of the ball is over the pad is 1.8 mm higher than its lowest point."""
+    with pytest.raises(ConvergenceError, match=r"Step 2 .* takes the object off the sensor; .* at x 8\.6, y .* 4\.8 mm") as caught:
+        move(surface, standing(BALL), Motion().press(force_n=2.0).slide(x_mm=8.6), friction=0.0)
+    assert len(caught.value.result.depth_mm) == 1
+
+
+def test_a_depth_beyond_the_layer_is_refused_before_it_is_solved(surface, monkeypatch):
+    def solve(*_, **__):
+        raise AssertionError("solved")
+
+    monkeypatch.setattr("softtact.models.elastic.sliding.solve_increment", solve)
+    with pytest.raises(ConvergenceError, match=r"Step 1 was not reached: the object would be 3 mm deep in a layer 2\.5 mm thick"):
+        move(surface, standing(BALL), Motion().press(depth_mm=3.0), friction=0.3)
+
+
 def test_deeper_than_the_layer_is_not_reached_and_the_steps_before_are_kept(surface):
     with pytest.raises(ConvergenceError, match=r"Step 2 was not reached: the object would be 2\.6 mm deep") as caught:
         move(surface, standing(BALL), Motion().press(depth_mm=[0.2, 2.6]), friction=0.0)

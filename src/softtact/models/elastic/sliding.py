@@ -30,6 +30,7 @@ _REFUSED = "the elastic model prescribes x, y and z and loads z only; leave {} o
 _SETTINGS = CoulombSettings()
 
 
+_LOW_MM = 0.02                           # what is so little above the lowest point counts as where the object first touches
 _HALVINGS = 6                            # the moment of touch is found to a 64th of an increment
 
 
@@ -335,11 +336,30 @@ def steps_on_layer(mover: SlidingObject, motion: Motion) -> Iterator[tuple[Slidi
     state, load = mover.start, None
     for number, step in enumerate(motion.steps, start=1):
         load = load_after(step, load)
+        if load is None:     # before what takes long to solve
+            _refuse_deep(mover, state.position[2] - step.ways.get("z", 0.0), number)
         state, count = _follow_step(mover, state, step, load)
-        if state.position[2] > mover.deepest_mm:
-            raise ConvergenceError(f"Step {number} was not reached: the object would be {state.position[2]:.3g} mm deep in a "
-                                   f"layer {mover.deepest_mm:g} mm thick; press less deep or with less force.")
+        if load is not None and state.position[2] > mover.deepest_mm:
+            _refuse_leaving(mover, state.position[:2], number)
+        _refuse_deep(mover, state.position[2], number)
         yield state, count
+
+
+def _refuse_deep(mover, depth, number):
+    """Refuse a step at whose end the object is deeper than the layer is thick."""
+    if depth > mover.deepest_mm:
+        raise ConvergenceError(f"Step {number} was not reached: the object would be {depth:.3g} mm deep in a layer "
+                               f"{mover.deepest_mm:g} mm thick; press less deep or with less force.")
+
+
+def _refuse_leaving(mover, aside, number):
+    """Refuse a step that takes the middle of what first touches off the surface: what is left over it does not carry the load."""
+    grid = mover.compliance.grid
+    heights, half = mover.heights(grid.points), np.array([grid.x[-1], grid.y[-1]]) + (0.0 if grid.sides else grid.step)
+    x, y = grid.points[heights <= heights.min() + _LOW_MM].mean(axis=0) + aside
+    if abs(x) > half[0] or abs(y) > half[1]:
+        raise ConvergenceError(f"Step {number} was not reached: it takes the object off the sensor; what touches first would be at "
+                               f"x {x:.4g}, y {y:.4g} mm, and the sensor ends at {half[0]:g} and {half[1]:g} mm; move it less far.")
 
 
 def motion_of(mover: SlidingObject, steps: Sequence[tuple[SlidingState, int]]) -> ElasticMotion:
