@@ -15,7 +15,7 @@ from softtact.contact.motion import Motion
 from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
 from softtact.contact.undersides import underside_of
-from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
+from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE, among_candidates
 from softtact.errors import ConvergenceError, InputError, NarrowPartWarning
 from softtact.linalg.workers import on_one_thread
 from softtact.models.elastic.compliance import LayerPress, press_object
@@ -253,13 +253,12 @@ def _of_candidates(underside, points_within, reach, deepest, solve, depth_of):
 
     Beside the object the surface rises, so points slightly above the object's depth can touch, too.
     """
-    while True:
-        reach = min(reach, deepest)
+    def among(reach):
         points = points_within(reach)
-        found = solve(points)
-        if reach == deepest or RISE * (depth_of(found) - underside.lowest_mm) <= reach:
-            return points, found
-        reach *= REACH
+        return points, solve(points)
+
+    return among_candidates(among, lambda found, _: RISE * (depth_of(found[1]) - underside.lowest_mm), reach_mm=reach,
+                            most_mm=deepest)
 
 
 # What a result takes over from an `ElasticMotion`.
