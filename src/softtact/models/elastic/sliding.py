@@ -25,11 +25,7 @@ from softtact.models.elastic.tangential import SurfaceCompliance
 
 _ASIDE, _DOWN = 0.5, 0.125      # of the nodes' spacing: the largest movements in an increment with friction
 _REFUSED = "the elastic model prescribes x, y and z and loads z only; leave {} out or take another model."
-
-
 _SETTINGS = CoulombSettings()
-
-
 _LOW_MM = 0.02                           # what is so little above the lowest point counts as where the object first touches
 _HALVINGS = 6                            # the moment of touch is found to a 64th of an increment
 
