@@ -150,7 +150,10 @@ def test_another_object_is_noticed(bench, experiments):
 
 
 def test_forces_in_kilograms_are_noticed(bench):
-    """A ball's contact grows with the force, so the counts' pattern tells it: 1 kgf is not 1 N."""
+    """A ball's contact grows with the force, so the counts' pattern tells it: 1 kgf is not 1 N.
+
+    At the least of such forces fewer points carry the ball than a valid load step needs; the larger ones count all the same.
+    """
     one = bench.experiment(BALL, (0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="as if the forces were in kilograms-force"):
         recorded(bench, one, force_n=one.force_n / 9.80665)

@@ -10,7 +10,7 @@ from softtact.errors import ConvergenceError
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
-from softtact.press.validity import flags_elastic, flags_foundation, flags_hyperelastic, reasons
+from softtact.press.validity import flags_elastic, flags_foundation, flags_hyperelastic, reasons, touches_lightly
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
         "rough": [False, False, False], "residual_n": [0.09, 0.1, 0.1], "volume_ratio": [0.9, 0.5, np.nan],
@@ -134,3 +134,9 @@ def test_a_force_of_which_the_solver_leaves_more_than_a_fiftieth_is_flagged():
 
 def test_depths_may_fall_where_the_force_does_not_grow():
     assert valid(depth_mm=[0.3, 0.2, 0.1], forces_n=[50.0, 20.0, 20.0]) == [True, True, True]
+
+
+def test_a_load_step_is_light_where_few_points_are_its_only_flag():
+    few, deep = np.array([5, 5, 40]), np.array([0.1, 9.0, 9.0])
+    flags = flags_elastic(deep, np.zeros((3, 5, 5)), few, thickness_mm=2.0, dielectric_mm=1.0)
+    assert [touches_lightly(reason) for reason in (*reasons(flags, 3), "")] == [True, False, False, False]

@@ -22,6 +22,7 @@ from softtact.errors import ConvergenceError, InputError, ShellWarning
 from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor, load_sensor
+from softtact.press.validity import touches_lightly
 from softtact.progress import announce
 from softtact.sensors.fields import SidesBelow
 from softtact.sensors.frusta import SensorSpec
@@ -65,16 +66,18 @@ class Presses:
     def reach(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float) -> tuple[float, float]:
         """The largest of some coarse load steps (N) for which the model is valid for an object at a place, and the next load step.
 
-        Both are `largest_n` if it is valid. The press ends at the first invalid load step, because later ones can take minutes.
+        Both are `largest_n` if it is valid. The press ends at the first invalid load step, because later ones can take minutes, but
+        not at those that are too light for the model's points, which come first.
         """
         def stop(result: PressResult) -> None:
-            if not result.within_validity[-1]:
+            if not (result.within_validity[-1] or touches_lightly(result.validity_reason[-1])):
                 raise _BeyondError(result)
 
         forces = even_in_root(largest_n, REACH_LEVELS)
         result = self._press(mesh, place, forces, 1.0, stop)
-        valid = int(np.cumprod(result.within_validity).sum())
-        return float(forces[valid - 1]) if valid else 0.0, float(forces[min(valid, len(forces) - 1)])
+        valid = np.flatnonzero(result.within_validity)
+        last = int(valid[-1]) if len(valid) else -1
+        return float(forces[last]) if len(valid) else 0.0, float(forces[min(last + 1, len(forces) - 1)])
 
     def _press(self, mesh, place, forces, cover, on_step):
         with warnings.catch_warnings(action="ignore", category=ShellWarning):

@@ -199,7 +199,8 @@ def _by_error(sensor, placed, forces, tolerance_mm, control):
             errors[name] = np.full(len(forces), np.inf)
             first = np.flatnonzero(result.within_validity == 0)[0]
             why = f" ({result.validity_reason[first]})" if result.validity_reason[first] else ""
-            remarks.append(f"the {name} model does not hold from {result.normal_force_n[first]:g} N on{why}")
+            on = "" if result.within_validity[first:].any() else " on"
+            remarks.append(f"the {name} model does not hold {'from' if on else 'at'} {result.normal_force_n[first]:g} N{on}{why}")
     mostly = {name: INTERVALS[name][1] * values for name, values in errors.items()}
     model = cheapest(mostly, tolerance_mm)
     stated = [f"{name} {plain(values.max())} (90 % below {plain(mostly[name].max())}) mm" for name, values in errors.items()

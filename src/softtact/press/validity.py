@@ -59,6 +59,11 @@ def few_points(points: np.ndarray, of: str = "surface") -> Flags:
             (points > 0) & (points < _FEWEST_POINTS)}
 
 
+def touches_lightly(reason: str) -> bool:
+    """Whether a load step is flagged for few points alone, as the first ones may be; those of larger forces may be valid."""
+    return bool(reason) and all(part.startswith(f"fewer than {_FEWEST_POINTS} points") for part in reason.split(BETWEEN))
+
+
 def flags_elastic(depth_mm: np.ndarray, fields_mm: np.ndarray, points: np.ndarray, *, thickness_mm: float,
                   dielectric_mm: float) -> Flags:
     """Flags of an elastic press, by the descent (l,) of the object's lowest point, the surface's deformation (l, y, x) in mm
