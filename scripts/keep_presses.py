@@ -7,7 +7,8 @@
 benchmarks/results/presses/STUDY/MODEL/ITEM.npz: 14 kB in place of 1 MB. Maps are rounded to 0.1 um; fields that no later stage
 reads are left out. `restore` writes those that are missing back, if the study's settings are still those of their presses. The
 objects have to be drawn before, else the workflow takes them for newer. Snakemake then makes the rest. Scores of trained networks
-are kept in benchmarks/results/presses/STUDY/learning.csv, and put back once the readings are there from which networks learn.
+and their learning curves are kept in benchmarks/results/presses/STUDY/learning.csv and curves.csv, and put back once the readings
+are there from which networks learn.
 """
 
 import argparse
@@ -23,11 +24,12 @@ import xarray
 
 from softtact.errors import InputError
 from softtact.files import PROVENANCE, atomic_path, digest, read_arrays, read_csv, read_dataset, read_yaml, write_csv, write_dataset
+from softtact.studies.jobs import paths_of
 from softtact.studies.registry import checked_study
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORD = ROOT / "benchmarks" / "results" / "presses"
-LEARNING = "learning.csv"
+TRAINED = {"learn": "learning.csv", "trace_curve": "curves.csv"}     # {stage: record}; a curve ends with scores, which come first
 MAP, STEP_MM = "deformation_map_mm", 1e-4
 
 
@@ -105,42 +107,47 @@ def restore(jobs: list, study: str) -> tuple[int, int]:
 
 def keep_trainings(jobs: list, study: str) -> int:
     """Write the scores of the trainings that are done, beside those that were kept before; how many."""
-    kept = _kept_scores(study)
-    for path, name, settings in _trainings(jobs):
-        if path.exists():
-            kept[name] = read_csv(path).assign(training=name, settings=digest(settings))
-    if kept:
-        write_csv(RECORD / study / LEARNING, pd.concat(kept.values()))
-    return len(kept)
+    count = 0
+    for stage, record in TRAINED.items():
+        kept = _kept_scores(study, record)
+        for path, name, job in _trainings(jobs, stage):
+            if path.exists():
+                kept[name] = read_csv(path).assign(training=name, settings=digest(job.settings))
+        if kept:
+            write_csv(RECORD / study / record, pd.concat(kept.values()))
+        count += len(kept)
+    return count
 
 
 def restore_trainings(jobs: list, study: str) -> tuple[int, int]:
     """Write the scores that are missing and were kept; how many, and how many have to wait for their readings or changed."""
     count = left = 0
-    kept = _kept_scores(study)
-    needed = [Path(path) for job in jobs if job.stage == "learn" for path in (job.inputs["readings"], job.inputs["maps"])]
-    for path, name, settings in _trainings(jobs):
-        if path.exists() or name not in kept:
-            continue
-        if not all(one.exists() for one in needed) or set(kept[name].settings) != {digest(settings)}:
-            left += 1
-            continue
-        write_csv(path, kept[name].drop(columns=["training", "settings"]))
-        count += 1
+    for stage, record in TRAINED.items():
+        kept = _kept_scores(study, record)
+        for path, name, job in _trainings(jobs, stage):
+            if path.exists() or name not in kept:
+                continue
+            ready = all(Path(one).exists() for one in paths_of(job.inputs))
+            if not ready or set(kept[name].settings) != {digest(job.settings)}:
+                left += 1
+                continue
+            write_csv(path, kept[name].drop(columns=["training", "settings"]))
+            count += 1
     return count, left
 
 
-def _kept_scores(study):
-    """{training: its rows} of the record."""
-    record = RECORD / study / LEARNING
-    return dict(iter(read_csv(record).groupby("training", sort=False))) if record.exists() else {}
+def _kept_scores(study, record):
+    """{training: its rows} of a record."""
+    path = RECORD / study / record
+    return dict(iter(read_csv(path).groupby("training", sort=False))) if path.exists() else {}
 
 
-def _trainings(jobs):
-    """(scores, name, settings) of the jobs that train a network."""
+def _trainings(jobs, stage):
+    """(scores, name, job) of a stage's jobs that train a network."""
     for job in jobs:
-        if job.stage == "learn":
-            yield Path(str(job.made()["scores"])), "/".join(job.wildcards.values()), job.settings
+        if job.stage == stage:
+            (path,) = job.made().values()
+            yield Path(str(path)), "/".join(job.wildcards.values()), job
 
 
 def commits(study: str) -> Counter[str]:

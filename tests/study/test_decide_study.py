@@ -54,18 +54,50 @@ def test_every_training_of_the_printed_network_is_a_job_and_all_scores_are_gathe
     learned = [job for job in made if job.stage == "learn"]
     seeds = {name: sorted(seed for job in learned if job.settings["architecture"] == name and job.settings["truth"] == "a"
                           and job.settings["model"] == "elastic" for seed in job.settings["seeds"]) for name in (COMPACT, PRINTED)}
-    assert seeds == {COMPACT: [0, 1, 2, 3, 4], PRINTED: [0, 1, 2]} and len(learned) == len(MODELS) * (4 * 1 + 2 * 3)
+    assert seeds == {COMPACT: [0, 1, 2, 3, 4], PRINTED: [0, 1, 2]} and len(learned) == (2 * len(MODELS) + 2 * 3) * (1 + 3)
     gathered = next(job for job in made if job.stage == "gather_scores")
     scores = [job.made()["scores"] for job in learned]
     assert sorted(gathered.inputs["networks"]) == sorted(scores) and len(set(scores)) == len(scores)
 
 
 def test_only_a_network_that_asks_for_them_is_trained_on_the_controls(tmp_path):
-    made = jobs(load_study(read_values("config/decide.yaml")), tmp_path)
+    values = read_values("config/decide.yaml")
+    values["learning"]["printed"]["controls"] = False
+    made = jobs(load_study(values), tmp_path)
     truths = {name: {job.settings["truth"] for job in made if job.stage == "learn" and job.settings["architecture"] == name}
               for name in (COMPACT, PRINTED)}
     assert truths == {COMPACT: {"a", "b", *CONTROLS}, PRINTED: {"a", "b"}}
+
+
+def test_controls_are_trained_for_the_models_that_they_compare_and_have_no_learning_curve(tmp_path):
+    made = jobs(load_study(read_values("config/decide.yaml")), tmp_path)
+    learned = [job.settings for job in made if job.stage == "learn"]
+    assert {one["model"] for one in learned if one["truth"] in CONTROLS} == {"elastic", "matched", "hyperelastic"}
+    assert {one["model"] for one in learned if one["truth"] not in CONTROLS} == set(MODELS)
     assert {job.settings["truth"] for job in made if job.stage == "trace_curve"} == {"a", "b"}
+
+
+def test_a_learning_curve_ends_with_the_first_training_of_its_network(tmp_path):
+    made = jobs(load_study(read_values("config/decide.yaml")), tmp_path)
+    curves = [job for job in made if job.stage == "trace_curve"]
+    assert {job.settings["architecture"] for job in curves} == {COMPACT, PRINTED} and len(curves) == 2 * 2 * len(MODELS)
+    for job in curves:
+        last = next(one for one in made if str(one.made().get("scores")) == job.inputs["whole"])
+        alike = ("architecture", "truth", "model", "trained", "seed")
+        assert last.settings["seeds"][0] == 0 and [last.settings[name] for name in alike] == [job.settings[name] for name in alike]
+
+
+def test_a_policy_is_scored_where_all_models_that_it_chooses_are():
+    """The policy by expected error takes the foundation model for one object, which was not read under the control."""
+    names = ["elastic", "hyperelastic", "foundation"]
+    rows = [(truth, model, "compact", 0, name, *[0.1] * 4) for truth, models in {"a": names, "ceiling": names[:2]}.items()
+            for model in models for name in ("cap", "step")]
+    scores = pd.DataFrame(rows, columns=["truth", "model", "readout", "seed", "object", "error_share", "ssim_own_range",
+                                         "ssim_paper", "ssim_paper_whole"]).assign(kind="smooth", maps=1, largest_force_n=50.0)
+    choices = pd.DataFrame({"object": ["cap", "step"], "rule": names[:2], "by_error": names[1:]})
+    found = policy_scores(scores, choices)
+    assert set(found.model[found.truth == "a"]) == {"hybrid", "random", "error", "oracle"}
+    assert set(found.model[found.truth == "ceiling"]) == {"hybrid", "random", "oracle"}
 
 
 def test_the_steps_are_spread_over_their_range():
@@ -162,9 +194,15 @@ def tables_of(scores, *, shown=0.9):
     return Tables(pd.concat([scores, policy_scores(scores, choices)]), choices, collapse, power)
 
 
+def points(shares, errors, *, indenters=40):
+    """A learning curve of the compact network from the elastic model's maps."""
+    return pd.DataFrame({"truth": "a", "model": "elastic", "readout": "compact", "share": shares, "indenters": indenters,
+                         "error_share": errors})
+
+
 def claim_of(name, tables, table):
     """The verdict on a claim by its tests."""
-    curve = with_flatness(pd.DataFrame({"truth": "a", "model": "elastic", "share": [1.0], "indenters": [40], "error_share": [0.2]}))
+    curve = with_flatness(points([1.0], [0.2], indenters=[40]))
     claims = claims_of_decision(vars(tables) | {"hypotheses": table, "learning_curve": curve}, statistics=STATISTICS, truths=["a"],
                                 printed=False)
     return claims.verdict.iloc[list(FAMILIES).index(name)]
@@ -362,8 +400,7 @@ def test_chance_scores_between_the_models_and_the_oracle_at_least_as_well_as_eac
 def test_the_claims_follow_the_tests(gain, verdict):
     tables = tables_of(simulated(gain))
     table = hypothesis_table(tables, statistics=STATISTICS, truths=["a"], seed=0)
-    curve = with_flatness(pd.DataFrame({"truth": "a", "model": "elastic", "share": [0.5, 1.0], "indenters": [20, 40],
-                                        "error_share": [0.2, 0.199]}))
+    curve = with_flatness(points([0.5, 1.0], [0.2, 0.199], indenters=[20, 40]))
     claims = claims_of_decision(vars(tables) | {"hypotheses": table, "learning_curve": curve}, statistics=STATISTICS,
                                 truths=["a"], printed=False)
     assert claims.verdict.iloc[0] == verdict
@@ -376,7 +413,7 @@ def test_the_claim_of_two_curves_fails_where_one_of_its_tests_does(shown, verdic
     tables = tables_of(simulated(0.0), shown=shown)
     table = hypothesis_table(tables, statistics=STATISTICS, truths=["a"], seed=0)
     rows = pd.concat([table, table[table.claim == "collapse"].assign(truth="b", alone="holds", verdict="holds")])
-    curve = with_flatness(pd.DataFrame({"truth": "a", "model": "elastic", "share": [1.0], "indenters": [40], "error_share": [0.2]}))
+    curve = with_flatness(points([1.0], [0.2], indenters=[40]))
     claims = claims_of_decision(vars(tables) | {"hypotheses": rows, "learning_curve": curve}, statistics=STATISTICS,
                                 truths=["a"], printed=False)
     assert claims.verdict.iloc[-2] == verdict
@@ -384,13 +421,13 @@ def test_the_claim_of_two_curves_fails_where_one_of_its_tests_does(shown, verdic
 
 def test_a_learning_curve_is_flat_by_what_twice_as_many_indenters_would_gain():
     """By hand: 4 % from three quarters on are 1 - .96^(ln 2 / ln (4 / 3)) = 9.4 % for twice as many."""
-    curve = pd.DataFrame({"truth": "a", "model": "elastic", "share": [0.75, 1.0], "error_share": [0.2, 0.192]})
+    curve = points([0.75, 1.0], [0.2, 0.192])
     found = with_flatness(curve)
     assert found.last_fall.to_list() == pytest.approx([0.0937, 0.0937], abs=1e-4) and not found.flat.any()
 
 
 def test_a_learning_curve_that_still_falls_is_not_flat():
-    curve = pd.DataFrame({"truth": "a", "model": "elastic", "share": [0.5, 1.0], "error_share": [0.2, 0.15]})
+    curve = points([0.5, 1.0], [0.2, 0.15])
     assert not with_flatness(curve).flat.any()
 
 

@@ -114,3 +114,20 @@ def test_trainings_come_back_once_their_readings_are_there_and_unchanged(script,
         (tmp_path / name).touch()
     assert script.restore_trainings(trainings(tmp_path, batch=8), "study") == (0, 1)
     assert script.restore_trainings(made, "study") == (1, 0) and path.read_text() == before
+
+
+def test_a_learning_curve_comes_back_after_the_training_at_its_end(script, tmp_path):
+    """Else that training is made later, and the curve anew, though it was kept."""
+    *_, training = trainings(tmp_path)
+    curve = Job("trace_curve", training.inputs | {"whole": training.made()["scores"]}, {"curve": f"{tmp_path}/curve.csv"}, {},
+                {"truth": "a", "model": "elastic", "network": "printed"})
+    kept = [scored(training), Path(curve.made()["curve"])]
+    kept[1].write_text("truth,share\na,0.5\n")
+    assert script.keep_trainings([curve, training], "study") == 2
+    before = [path.read_text() for path in kept]
+    for path in kept:
+        path.unlink()
+    for name in ("readings.nc", "maps.nc"):
+        (tmp_path / name).touch()
+    assert script.restore_trainings([curve], "study") == (0, 1)
+    assert script.restore_trainings([curve, training], "study") == (2, 0) and [path.read_text() for path in kept] == before

@@ -109,12 +109,13 @@ def _collapsed(hypotheses, truths):
 
 def _curve(curve, printed, statistics):
     """Whether the networks have seen enough maps."""
-    ends = curve.drop_duplicates(["truth", "model"])
-    flat, known = int(ends.flat.sum()), len(ends)
-    enough = known and flat == known and curve.indenters.max() >= statistics["least_objects"]
-    network = "the printed network is trained, too" if printed else "the printed network is not trained here (learning.printed)"
+    ends = curve.drop_duplicates(["truth", "model", "readout"])
+    enough = len(ends) and ends.flat.all() and curve.indenters.max() >= statistics["least_objects"]
+    said = [f"{own.flat.sum()} of {len(own)} learning curves of the {readout} network are flat at their end"
+            for readout, own in ends.groupby("readout", sort=False)]
+    said += [] if printed else ["the printed network is not trained here (learning.printed)"]
     return row("The networks are trained on enough maps", "sec. 3.3.2", "13,000 maps",
-               f"{flat} of {known} learning curves of the compact network are flat at their end; {network}",
+               "; ".join(said),
                REPRODUCED if enough else UNDECIDED,
                "at the rate of its last step, twice as many indenters change the error by less than 5 % of itself",
                "tables/learning_curve.csv", uncertainty="one seed")

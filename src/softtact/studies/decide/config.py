@@ -1,6 +1,6 @@
 """The study that decides the paper's claims: its configuration, and what it presses."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,6 @@ from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_v
 
 from softtact.errors import InputError
 from softtact.geometry.generated import GeneratedObject, draw_objects
-from softtact.learning.settings import Share
 from softtact.readout.ssim import check_window
 from softtact.sensors.fields import plain_value
 from softtact.sensors.frusta import SensorSpec
@@ -23,6 +22,7 @@ DEFAULT = "config/decide.yaml"
 ELASTIC, ELECTRODES, MATCHED, FOUNDATION, HYPERELASTIC = MODELS = (
     "elastic", "electrodes", "matched", "foundation", "hyperelastic")
 CONTROLS = {"ceiling": HYPERELASTIC, "flipped": MATCHED}     # truths that are tested models
+COMPARED = ELASTIC, MATCHED, HYPERELASTIC     # with each other in the controls: networks are trained for them alone there
 INDENTERS = "indenters"
 FORMULAS = GAP, QUADRATIC = "gap", "quadratic"      # readouts that are fitted
 NETWORKS = COMPACT, PRINTED = "compact", "printed"
@@ -70,7 +70,8 @@ class Trainings(Section):
     epochs: PositiveInt
     batch: PositiveInt
     learning_rate: PositiveFloat
-    controls: bool = Field(False, description="whether it is trained on the controls' readings, too")
+    controls: bool = Field(False, description="whether it is trained on the controls' readings, too, for the models compared there")
+    curve: list[Fraction] = Field([], description="shares of the training indenters at which its first seed is trained anew")
 
 
 class Learning(Section):
@@ -80,12 +81,21 @@ class Learning(Section):
     truths: Annotated[list[Name], Field(min_length=1)] = Field(description="whose readings networks are trained on")
     compact: Trainings
     printed: Trainings | None = Field(None, description="the paper's network; null: none")
-    curve: list[Share] = Field(description="shares of the training indenters at which the compact network is trained anew")
     device: Literal["auto", "cpu", "cuda"] = "auto"
+
+    @property
+    def networks(self) -> dict[str, Trainings]:
+        """{architecture: its trainings} of those that are trained."""
+        return {COMPACT: self.compact} | ({PRINTED: self.printed} if self.printed is not None else {})
 
     def truths_of(self, trained: Trainings) -> list[str]:
         """Whose readings a network is trained on, in order."""
         return list(dict.fromkeys([*self.truths, *(CONTROLS if trained.controls else [])]))
+
+
+def pairs_of(truths: Iterable[str]) -> list[tuple[str, str]]:
+    """(truth, model) of whose readings networks are trained on, and of whose maps, in order."""
+    return [(truth, model) for truth in truths for model in (COMPARED if truth in CONTROLS else MODELS)]
 
 
 class Assumed(Section):

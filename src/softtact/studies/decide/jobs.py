@@ -5,7 +5,8 @@
     matched.json                           the modulus of the matched elastic model
     presses/MODEL/ITEM.nc                  of tested models, truths, and truths of the map of robustness (few items)
     readings/TRUTH.nc                      the virtual sensor's counts of all items
-    learning/TRUTH/MODEL_compact.csv, _printed_SEED.csv, _curve.csv      scores of networks, and on growing shares of indenters
+    learning/TRUTH/MODEL_compact.csv, _printed_SEED.csv      scores of networks
+    learning/TRUTH/MODEL_NETWORK_curve.csv                   on growing shares of the indenters
     tables/power.csv                       stated before any score is known
     tables/scores.csv, mean_scores.csv     of each object, and their means
     tables/hypotheses.csv, learning_curve.csv, robustness.csv, collapse.csv, claims.csv
@@ -23,7 +24,6 @@ import numpy as np
 from softtact.sensors.library import material_file
 from softtact.studies.configuration import found_sensor
 from softtact.studies.decide.config import (
-    COMPACT,
     FORMULAS,
     HYPERELASTIC,
     MATCHED,
@@ -33,6 +33,7 @@ from softtact.studies.decide.config import (
     DecideStudy,
     Pressing,
     Trainings,
+    pairs_of,
 )
 from softtact.studies.jobs import Job, figure_files, from_here
 
@@ -143,33 +144,41 @@ class _Jobs:
         return {"readings": f"{self.folder}/readings/{truth}.nc", "maps": f"{self.folder}/maps.nc", **self.sensor}
 
     def learning(self) -> list[Job]:
-        """The trainings of networks on one model's maps and one truth's readings, and the compact network's learning curve."""
-        plan, learned = self.values.learning, f"{self.folder}/learning/{{truth}}/{{model}}"
-        trainings = [(COMPACT, COMPACT, plan.compact, list(range(plan.compact.seeds)))]
-        if plan.printed is not None:      # one takes minutes: each is a job of its own
-            trainings += [(f"{PRINTED}_{seed}", PRINTED, plan.printed, [seed]) for seed in range(plan.printed.seeds)]
+        """The trainings of networks on one model's maps and one truth's readings, and their learning curves."""
+        networks = self.values.learning.networks.items()
+        return [job for jobs_of in (self._trainings, self._curves) for name, trained in networks for job in jobs_of(name, trained)]
+
+    def _trainings(self, architecture: str, trained: Trainings) -> list[Job]:
+        """A network's trainings; one of the printed network takes minutes, and each is a job of its own."""
+        each = [[seed] for seed in range(trained.seeds)] if architecture == PRINTED else [list(range(trained.seeds))]
         made = []
-        for network, architecture, trained, seeds in trainings:
+        for seeds in each:
             settings, work = self._training(architecture, trained, len(seeds))
-            made += [Job("learn", self.maps(about["truth"]), {"scores": f"{learned}_{{network}}.csv"},
-                         about | settings | {"seeds": seeds}, about | {"network": network}, work)
-                     for about in self._pairs(plan.truths_of(trained))]
-        settings, work = self._training(COMPACT, plan.compact, len(plan.curve))
-        made += [Job("trace_curve", self.maps(about["truth"]), {"curve": f"{learned}_curve.csv"},
-                     about | settings | {"shares": plan.curve}, about, work) for about in self._pairs(plan.truths)]
+            network = f"{architecture}_{seeds[0]}" if architecture == PRINTED else architecture
+            made += [Job("learn", self.maps(truth), {"scores": f"{self.folder}/learning/{{truth}}/{{model}}_{{network}}.csv"},
+                         {"truth": truth, "model": model} | settings | {"seeds": seeds},
+                         {"truth": truth, "model": model, "network": network}, work)
+                     for truth, model in pairs_of(self.values.learning.truths_of(trained))]
         return made
 
-    @staticmethod
-    def _pairs(truths: Sequence[str]) -> list[dict[str, str]]:
-        """Each truth with each tested model."""
-        return [{"truth": truth, "model": model} for truth in truths for model in MODELS]
+    def _curves(self, architecture: str, trained: Trainings) -> list[Job]:
+        """A network's learning curves: of the study's truths, their ends the first trainings."""
+        settings, work = self._training(architecture, trained, len(trained.curve))
+        first = f"{architecture}_0" if architecture == PRINTED else architecture
+        learned = f"{self.folder}/learning/{{truth}}/{{model}}"
+        return [Job("trace_curve", self.maps(truth) | {"whole": f"{learned}_{first}.csv".format(truth=truth, model=model)},
+                    {"curve": f"{learned}_{{network}}_curve.csv"},
+                    {"truth": truth, "model": model} | settings | {"shares": trained.curve},
+                    {"truth": truth, "model": model, "network": architecture}, work)
+                for truth, model in pairs_of(self.values.learning.truths)]
 
     def _training(self, architecture: str, trained: Trainings, times: int) -> tuple[dict[str, Any], dict[str, float]]:
         """Settings of a job that trains an architecture some times, and its work."""
         plan = self.values.learning
+        schedule = trained.model_dump(mode="json", exclude={"seeds", "controls", "curve"})
         settings = {"architecture": architecture, "seed": self.values.seed, "device": plan.device,
                     "validation_share": plan.validation_share, "ssim_window": self.values.ssim_window,
-                    "scored": self.values.scored, "trained": trained.model_dump(mode="json", exclude={"seeds", "controls"})}
+                    "scored": self.values.scored, "trained": schedule}
         return settings, {f"{architecture}_maps": len(self.study.indenters) * len(self.forces) * trained.epochs * times}
 
     def judging(self) -> list[Job]:
@@ -210,9 +219,7 @@ class _Jobs:
 
     def _seeds(self):
         """{readout: number of its trainings}; formulas have one."""
-        learning = self.values.learning
-        networks = {COMPACT: learning.compact, PRINTED: learning.printed}
-        return dict.fromkeys(FORMULAS, 1) | {name: made.seeds for name, made in networks.items() if made}
+        return dict.fromkeys(FORMULAS, 1) | {name: made.seeds for name, made in self.values.learning.networks.items()}
 
     def _collapse(self, table, shown):
         stepped = [item for item in self.study.objects if item.set == "stepped"]

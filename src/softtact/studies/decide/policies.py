@@ -62,9 +62,10 @@ def policy_scores(scores: pd.DataFrame, choices: pd.DataFrame) -> pd.DataFrame:
 
 
 def _chosen(scores, policy, choose):
-    """The rows of the model that is chosen for their object."""
-    wanted = scores.apply(choose, axis=1)
-    return scores[scores.model == wanted].assign(model=policy)
+    """The rows of the model that is chosen for their object; none of a truth's readout that lacks a chosen model."""
+    taken, by = scores[scores.model == scores.apply(choose, axis=1)], ["truth", "readout"]
+    objects = scores.groupby(by).object.transform("nunique")
+    return taken[taken.groupby(by).object.transform("nunique") == objects[taken.index]].assign(model=policy)
 
 
 def _by_chance(scores, share):

@@ -101,18 +101,22 @@ def draw_collapse(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
 
 
 def draw_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Draw the learning curves of the compact network.  inputs: learning_curve;  outputs: png, svg."""
+    """Draw the learning curves of the networks, a row of panels for each.  inputs: learning_curve;  outputs: png, svg."""
     table = read_csv(inputs["learning_curve"])
-    truths = list(dict.fromkeys(table.truth)) or [""]
-    figure = pyplot().figure(figsize=(3.6 * len(truths) + 0.4, 3.2), layout="constrained")
-    for axes, truth in zip(figure.subplots(1, len(truths), squeeze=False, sharey=True)[0], truths, strict=True):
-        for model, own in table[table.truth == truth].groupby("model", sort=False):
+    truths, readouts = (list(dict.fromkeys(table[name])) for name in ("truth", "readout"))
+    figure = pyplot().figure(figsize=(3.6 * len(truths) + 0.4, 2.6 * len(readouts) + 0.6), layout="constrained")
+    grid = figure.subplots(len(readouts), len(truths), squeeze=False, sharex=True, sharey="row")
+    for (row, readout), (column, truth) in itertools.product(enumerate(readouts), enumerate(truths)):
+        axes = grid[row, column]
+        for model, own in table[(table.truth == truth) & (table.readout == readout)].groupby("model", sort=False):
             axes.plot(own.maps, own.error_share, "o-", ms=3, color=_FAMILY_COLOURS.get(model, "0.4"), label=model)
-        axes.set_title(f"truth {truth}", fontsize=9)
+        axes.set_title(f"truth {truth}, {readout}", fontsize=9)
+        axes.set_ylim(bottom=0)
+    for axes in grid[-1]:
         axes.set_xlabel("training maps")
-    figure.axes[0].set_ylabel("error over mean reading (1)")
-    if len(table):
-        figure.axes[0].legend(fontsize=7)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("error over mean reading (1)")
+    grid[0, 0].legend(fontsize=7)
     save(figure, outputs["png"], outputs["svg"])
 
 

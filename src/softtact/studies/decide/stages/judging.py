@@ -85,11 +85,12 @@ def with_flatness(curve: pd.DataFrame) -> pd.DataFrame:
     At the rate of the curve's last step.
     """
     falls = {}
-    for key, own in curve.groupby(["truth", "model"], sort=False):
+    by = ["truth", "model", "readout"]
+    for key, own in curve.groupby(by, sort=False):
         end = own.sort_values("share").iloc[-2:]
         rate = np.diff(np.log(end.error_share)) / np.diff(np.log(end.share))
         falls[key] = float(1 - 2 ** rate[0]) if len(rate) else np.nan
-    fall = np.array([falls[key] for key in zip(curve.truth, curve.model, strict=True)], dtype=float)
+    fall = np.array([falls[key] for key in curve[by].itertuples(index=False, name=None)], dtype=float)
     return curve.assign(last_fall=fall, flat=np.abs(fall) < _FLAT)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from softtact.files import write_csv
+from softtact.files import read_csv, write_csv
 from softtact.studies.decide.config import MODELS
 from softtact.studies.decide.scoring import (
     COLUMNS,
@@ -23,7 +23,8 @@ from softtact.studies.decide.scoring import (
 if TYPE_CHECKING:
     from softtact.learning.dataset import Samples
 
-CURVE_COLUMNS = ["truth", "model", "share", "indenters", "maps", "best_epoch", "epochs", "error_share", "ssim_own_range"]
+CURVE_COLUMNS = ["truth", "model", "readout", "share", "indenters", "maps", "best_epoch", "epochs", "error_share", "ssim_own_range"]
+_FIRST = 0     # seed of a curve's trainings
 
 
 def score_formulas(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -53,13 +54,15 @@ def learn(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
 
 
 def trace_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Train a network on growing shares of the indenters.
+    """Train a network on growing shares of the indenters; all of them are those of the first training.
 
-    inputs: as of `score_formulas`;  outputs: curve (CSV: CURVE_COLUMNS)
+    inputs: as of `score_formulas`, and whole (scores of `learn`, of seed 0 and others)
+    outputs: curve (CSV: CURVE_COLUMNS; epochs of the whole are not known)
     settings: as of `learn`, with shares in place of seeds
     """
     work = _Work(read_case(inputs, settings["scored"]), settings, threads)
-    write_csv(outputs["curve"], pd.DataFrame(list(work.curve()), columns=CURVE_COLUMNS))
+    rows = pd.DataFrame([*work.curve(), work.end_of_curve(read_csv(inputs["whole"]))], columns=CURVE_COLUMNS)
+    write_csv(outputs["curve"], rows.astype({"best_epoch": "Int64", "epochs": "Int64"}))
 
 
 class _Work:
@@ -80,9 +83,17 @@ class _Work:
         """A row for each share of the training indenters, first ones of one order."""
         for share in self._settings["shares"]:
             chosen = self.training[:max(1, round(share * len(self.training)))]
-            scores, facts = self.trained(chosen, 0)
-            yield {"truth": self._settings["truth"], "model": self._model, "share": share, "indenters": len(chosen), **facts,
-                   "error_share": scores.error_share.mean(), "ssim_own_range": scores.ssim_own_range.mean()}
+            scores, facts = self.trained(chosen, _FIRST)
+            yield self._point(scores, share, chosen) | facts
+
+    def end_of_curve(self, scores: pd.DataFrame) -> dict[str, Any]:
+        """The row of all training indenters, from the scores of a `learn` job."""
+        return self._point(scores[scores.seed == _FIRST], 1.0, self.training)
+
+    def _point(self, scores, share, chosen):
+        names = {"truth": self._settings["truth"], "model": self._model, "readout": self._settings["architecture"]}
+        return names | {"share": share, "indenters": len(chosen), "maps": len(self._case.samples(self._model, chosen, "train")),
+                        "error_share": scores.error_share.mean(), "ssim_own_range": scores.ssim_own_range.mean()}
 
     def trained(self, chosen: list[str], seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
         """Scores of the best network of one training on some indenters, and what is known of the training."""
@@ -104,7 +115,7 @@ class _Work:
                                label=label):
             pass
         run.network.load_state_dict(run.best["weights"])
-        facts = {"maps": len(train), "best_epoch": run.best["epoch"], "epochs": run.epoch}
+        facts = {"best_epoch": run.best["epoch"], "epochs": run.epoch}
         return self._scored(self._test, predict(run.network, self._test.maps_mm), architecture, seed), facts
 
     @property

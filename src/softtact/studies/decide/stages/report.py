@@ -12,7 +12,7 @@ CAPTIONS = {
               "force. Ceiling and flipped are controls: a tested model is the truth.",
     "collapse": "The collapse: what a map shows of the lower feature against step height over indentation, at all forces. Crosses: "
                 "elastic layers of all moduli, and the foundation model; circles: hyperelastic.",
-    "learning_curve": "Error of the compact network trained on growing shares of the indenters, with as many steps for each.",
+    "learning_curve": "Error of each network trained on growing shares of the indenters, with as many steps for each.",
     "robustness": "What the hyperelastic model errs less than the elastic ones against truths of every combination; few objects, "
                   "gap formula, one gain for all forces or for each alone. Right of zero the hyperelastic model is nearer; grey: "
                   "undecided.",
