@@ -112,6 +112,15 @@ def test_its_press_is_drawn_to_the_range_of_its_data_or_of_its_own_readout(press
         assert written == [f"{value:.0f}" for value in result.tactile_map[0].ravel()]
 
 
+def test_each_point_of_a_drawn_map_lies_in_the_middle_of_its_cell(pressed):
+    result = pressed["elastic"]
+    axes = result.plot().axes[0]
+    for (low, high), points in zip(np.reshape(axes.get_images()[0].get_extent(), (2, 2)), (result.x_mm, result.y_mm), strict=True):
+        edges = np.linspace(low, high, len(points) + 1)
+        assert 0.5 * (edges[1:] + edges[:-1]) == pytest.approx(points)
+    assert axes.get_xlim() == pytest.approx((result.x_mm[0], result.x_mm[-1]))
+
+
 @pytest.mark.parametrize(("values", "said"), [
     ({"map_shape": [30, 45]}, "has no middle row and column"),
     ({"footprint_mm": [30.0, 21.0]}, "18 x 13 frusta has a row in the middle"),

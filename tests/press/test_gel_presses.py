@@ -168,6 +168,16 @@ def test_what_a_gel_does_not_take_is_refused_in_a_sentence(gel, how, said):
         gel.press(BALL, label="", **how)
 
 
+def test_a_turn_that_takes_the_lowest_pin_off_the_gel_is_refused_and_a_smaller_one_is_pressed(gel):
+    """The pin is 3.6 mm left of the part's middle, about which it turns: from x = 1 by half a turn to 8.2; the gel ends at 8."""
+    plate = trimesh.creation.box((8.0, 4.0, 1.0), transform=trimesh.transformations.translation_matrix([5.0, 0.0, 1.5]))
+    pin = trimesh.creation.cylinder(radius=0.8, height=1.0, transform=trimesh.transformations.translation_matrix([1.0, 0.0, 0.5]))
+    part = trimesh.util.concatenate([plate, pin])
+    with pytest.raises(InputError, match=r"Step 2 of the motion takes the object off gelsight_wonkdim: .* x 8.2, y"):
+        gel.press(part, pose=np.zeros(6), motion="z -0.2; rz 180", label="")
+    assert gel.press(part, pose=np.zeros(6), motion="z -0.2; rz 5", label="").normal_force_n[1] > 0
+
+
 def test_the_force_on_a_gelsight_mini_is_about_the_measured_one():
     """GelSight Mini under a sphere of 15 mm, bonded: 1.65 N at 0.5 mm and 13.53 N at 1.5 mm were measured (feats, commit f15e158).
 

@@ -121,6 +121,45 @@ def test_bodies_fixed_to_an_object_press_with_it(coro):
     assert np.abs(maps[0] - maps[1]).max() < 0.03 * maps[0].max()
 
 
+MOVED = """<mujoco><option timestep="0.002" gravity="0 0 -9.81"/><worldbody>
+  <body name="hand" pos="0 0 .0126"><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass=".5" diaginertia="1 1 1"/></body>
+  {tool}</worldbody></mujoco>"""
+TOOLS = {"tool": '<body name="tool" mocap="true"><body name="tip"><geom type="box" size=".005 .005 .01"/></body></body>',
+         "middle": '<body name="base"><body name="middle"><body><geom type="box" size=".005 .005 .01"/></body></body></body>'}
+
+
+@pytest.mark.parametrize("name", TOOLS)
+def test_the_bodies_that_hang_on_a_named_object_count_as_it(coro, name):
+    """A sensor of 500 g that faces down rests on a geom of the object's child."""
+    spec = mujoco.MjSpec.from_string(MOVED.format(tool=TOOLS[name]))
+    sensor = attach(spec, "hand", coro, pose=[0, 0, 0, 180, 0, 0], objects=[name])
+    reading = sensor.read(settled(spec.compile()))
+    assert {one: -force[2] for one, force in reading.objects.items()} == pytest.approx({name: 0.5 * G}, rel=0.02)
+
+
+CLOTH = """<flexcomp name="cloth" type="grid" dim="2" count="5 5 1" spacing=".004 .004 .004" pos="0 0 .002" radius=".0005"
+  mass=".1"/>"""
+
+
+def test_a_cloth_that_touches_is_refused_and_left_out_where_objects_are_named(coro):
+    read = []
+    for objects in (None, ["box"]):
+        spec = mujoco.MjSpec.from_string(scene(box(x=0.1) + CLOTH))
+        sensor = attach(spec, "plate", coro, objects=objects)
+        read.append((sensor, settled(spec.compile(), 0.1)))
+    with pytest.raises(InputError, match="A flex touches the sensor on 'plate', which a sensor cannot press; name in 'objects'"):
+        read[0][0].read(read[0][1])
+    assert not read[1][0].read(read[1][1]).objects
+
+
+def test_what_only_shows_on_an_object_is_not_pressed():
+    label = f'<body pos="0 0 -.012"><geom type="sphere" size=".002" {NO_CONTACT} mass="0"/></body></body>'
+    bare, labelled = (mujoco.MjModel.from_xml_string(scene(one)) for one in (box(), box().replace("</body>", label)))
+    assert body_mesh(labelled, 2).bounds == pytest.approx(body_mesh(bare, 2).bounds)
+    shown = mujoco.MjModel.from_xml_string(scene(box().replace("</body>", label).replace('mass="0.5"', f'mass="0.5" {NO_CONTACT}')))
+    assert body_mesh(shown, 2).bounds[0, 2] == pytest.approx(-14.0, abs=1e-3)
+
+
 @pytest.mark.parametrize("joint", ["", "<joint type='slide'/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"])
 def test_a_free_base_that_carries_the_sensor_is_no_object(coro, joint):
     hand = f'<body name="hand">{joint}</body>'
@@ -247,6 +286,14 @@ def test_an_object_wholly_below_the_surface_says_so_as_in_a_press_alone(coro):
     assert not read_at(coro, plate, -0.05).validity_reason
 
 
+def test_a_small_ball_that_is_wholly_in_the_sensor_is_still_pressed_and_says_so(coro):
+    """Its middle is further below the surface than it is wide, and above the board."""
+    bead = '<body name="bead"><freejoint/><geom type="sphere" size=".001" mass=".1"/></body>'
+    within, beneath = (read_at(coro, bead, height) for height in (-1.1, -2.6))
+    assert list(within.objects) == ["bead"] and "its top is below the surface" in within.validity_reason
+    assert not beneath.objects
+
+
 def test_an_object_beneath_the_board_does_not_touch(coro):
     reading = read_at(coro, box(), -2.6)     # the board is at -2.5 mm
     assert not reading.objects and not reading.force_n.any() and not reading.validity_reason
@@ -367,6 +414,52 @@ def test_the_pressure_under_an_object_that_slides_goes_with_it(coro, aside_mm, w
         hand_back(data, [sensor])
     force, moment = np.split(data.xfrc_applied[model.body("box").id], 2)
     assert force[2] > 1.0 and np.abs(moment).max() < 1e-3 * within_mm * force[2]
+
+
+def test_a_gel_forgets_what_touched_in_an_episode_before(tmp_path):
+    """Two episodes of the same length in one state, read at their ends, and one alone; then as many steps more, told to begin."""
+    (tmp_path / "gel.yaml").write_text(SMALL_GEL)
+    spec = mujoco.MjSpec.from_string(scene(box(0.2)))
+    both, alone = (attach(spec, "plate", tmp_path / "gel.yaml", friction=0.8) for _ in range(2))
+    model = spec.compile()
+    data, seen = mujoco.MjData(model), []
+    for x, steps in ((0.0, 20), (0.002, 20), (0.0, 30)):
+        mujoco.mj_resetData(model, data)
+        data.qpos[0] = x
+        mujoco.mj_step(model, data, nstep=steps)
+        if steps == 30:
+            both.begin(data)
+        alone.begin(data)
+        seen.append([sensor.read(data).readings["markers"] for sensor in (both, alone)])
+    assert all((one == other).all() for one, other in seen) and np.abs(seen[1][0] - seen[0][0]).max() > 0
+
+
+def test_a_gel_says_that_it_carries_more_than_the_sensor_s_largest_force(tmp_path):
+    (tmp_path / "gel.yaml").write_text(SMALL_GEL)
+    gel = softtact.load_sensor(tmp_path / "gel.yaml")
+    most = gel.spec.force_range_n[1]
+    for share, said in ((0.9, False), (1.2, True)):
+        spec = mujoco.MjSpec.from_string(scene(box(share * most / G)))
+        sensor = attach(spec, "plate", gel, friction=0.8)
+        assert (f"the force is above {most:g} N" in sensor.read(settled(spec.compile(), 0.1)).validity_reason) == said
+
+
+RING = """<asset><mesh name="ring" vertex="{vertices}" face="{faces}"/></asset><worldbody>
+  <body name="ring" pos="0 0 .0001"><freejoint/><geom type="mesh" mesh="ring" mass=".5"/></body>"""
+
+
+def test_a_gel_inside_a_ring_that_the_engine_takes_for_its_hull_is_at_rest_and_says_so(tmp_path):
+    import trimesh
+
+    (tmp_path / "gel.yaml").write_text(SMALL_GEL)
+    gel = softtact.load_sensor(tmp_path / "gel.yaml")
+    inner = 0.5 * max(gel.spec.footprint_mm) * 1.5
+    ring = trimesh.creation.annulus(r_min=inner, r_max=inner + 3.0, height=6.0)
+    vertices, faces = (" ".join(map(str, values.ravel())) for values in (1e-3 * (ring.vertices + [0, 0, 3.0]), ring.faces))
+    spec = mujoco.MjSpec.from_string(scene("").replace("<worldbody>", RING.format(vertices=vertices, faces=faces)))
+    sensor = attach(spec, "plate", gel, friction=0.8)
+    reading = sensor.read(settled(spec.compile(), 0.05))
+    assert "free, for The object misses the sensor" in reading.validity_reason and not reading.deformation_map_mm.any()
 
 
 def test_a_gel_follows_the_object_of_each_state_alone(tmp_path):

@@ -5,12 +5,13 @@ import warnings
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
 from softtact.geometry.pose import Pose
 
 gymnasium = pytest.importorskip("gymnasium", reason="pip install 'softtact[robot]'")
-pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+mujoco = pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
 
 ID = "softtact.robot.environment:softtact/Grasp-v0"
 CLOSE, HOLD, LIFT, SLIDE = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.2, 1.0, 0.0), (-0.6, 0.0, 1.0)
@@ -49,6 +50,20 @@ def test_observations_are_of_both_fingers_with_stated_types(env):
     assert {name: (value.shape, value.dtype.name) for name, value in first.items()} == {
         "tactile": ((2, 7, 4), "uint16"), "force_n": ((2, 3), "float32"), "object_pose": ((7,), "float32")}
     assert not first["tactile"].any() and not first["force_n"].any()
+
+
+def test_an_object_that_turns_in_the_hand_has_not_risen_wherever_its_mesh_has_its_origin():
+    """A turn of 5 degrees about the closing direction, at rest in the middle of the grip; the mesh's origin rises by 26 mm."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=9.0)
+    for origin in ((0.0, 0.0, 0.0), (300.0, 0.0, 0.0)):
+        one = gymnasium.make(ID, mesh=ball.copy().apply_translation(origin)).unwrapped
+        one.reset(seed=1, options=STILL)
+        middle, free = one._data.body("object").xipos.copy(), one._data.joint("object").qpos
+        turn = Rotation.from_euler("x", 5, degrees=True)
+        free[:3] = middle + turn.apply(free[:3] - middle)
+        free[3:] = (turn * Rotation.from_quat(free[3:], scalar_first=True)).as_quat(scalar_first=True)
+        mujoco.mj_forward(one._scene.model, one._data)
+        assert abs(one.scene_facts()["risen_mm"]) < 0.01
 
 
 def test_a_seed_gives_the_same_episode_and_another_one_another(env):

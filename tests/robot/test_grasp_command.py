@@ -76,6 +76,7 @@ def test_where_mujoco_does_not_draw_a_sentence_says_so_and_the_maps_are_drawn(fo
 @pytest.mark.parametrize(("line", "said"), [
     ("grasp part.stl --force 10 --out o", "part.stl: no unit is stated, and the file holds none; state one of mm"),
     ("grasp part.stl --unit mm --force 80 --out o", "--force 80: 80 N is out of the range of sensor coro"),
+    ("grasp part.stl --unit mm --force 10 --sensor gelsight_mini --out o", "has no taxels, which a record of grasps needs"),
     ("grasp none.stl --unit mm --force 10 --out o", "none.stl: there is no such mesh file"),
     ("grasp part.stl --unit mm --force 10 --mass 0 --out o", "--mass 0: a mass is above 0"),
     ("grasp --replay part.stl --out o", "part.stl: not a readable NetCDF file"),

@@ -97,6 +97,17 @@ def test_the_expected_error_of_a_reading_is_that_of_its_press():
     assert errors[0, 0] == pytest.approx(exact.expected_error_mm[0], rel=0.02)
 
 
+@pytest.mark.parametrize("origin_mm", [(300.0, 0.0, 0.0), (0.0, -200.0, 50.0)])
+def test_readings_are_the_same_wherever_the_mesh_has_its_origin(origin_mm):
+    """Places are those of the object's middle: of an origin 300 mm away, a turn of a degree is a way of 5 mm."""
+    moved = CYLINDER.copy().apply_translation(origin_mm)
+    near, far = (TaxelMemory(load_sensor("coro"), mesh, "elastic", LARGEST_N) for mesh in (CYLINDER, moved))
+    for finger, pose, force in places(4):
+        there = np.append(pose[:3] - pose_of(pose).rotation.apply(origin_mm), pose[3:])
+        expected = near.counts(finger, pose, force)
+        assert far.counts(finger, there, force) == pytest.approx(expected, abs=1e-3 * expected.max())
+
+
 def test_an_object_beside_the_sensor_is_not_felt():
     memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
     assert memory.counts(0, np.array([30.0, 0, 0, 1, 0, 0, 0]), 5.0).max() < 1e-9

@@ -95,6 +95,9 @@ def _new(options):
                              "force; or give --replay events.nc.")
     spec = sensor_spec(options.sensor)
     check_forces([options.force], spec)
+    spec.need_taxels("a record of grasps")
+    if options.model != "auto":
+        spec.check_for(options.model)
     if options.shear and options.model not in ("elastic", "hyperelastic"):
         raise InputError(f"--shear: {options.model} has no tangential motion; name --model elastic or hyperelastic.")
     if options.mass is not None and not options.mass > 0:

@@ -79,17 +79,20 @@ MOST = 8     # maps in one picture, evenly chosen
 
 def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> None:
     """Draw `Maps` and counts (n, row, column) as PNG or SVG: a column for each map, with the map in mm above its counts."""
+    from softtact.press.plot import around_points
     from softtact.reporting.style import pyplot, save
 
     plt = pyplot()
     shown = [round(k * (len(counts) - 1) / max(1, min(MOST, len(counts)) - 1)) for k in range(min(MOST, len(counts)))]
-    extent, unit = _extent(maps)
+    x, y, unit = _grid(maps)
     figure, axes = plt.subplots(2, len(shown), figsize=(1.2 + 2.3 * len(shown), 7.2), squeeze=False, layout="constrained")
     most = max(1.0, float(counts.max()))          # over the whole range of 2400 counts light presses would be dark
     low, high = min(0.0, float(maps.maps_mm.min())), float(maps.maps_mm.max())
     for column, k in enumerate(shown):
-        image = axes[0, column].imshow(maps.maps_mm[k], origin="lower", extent=extent, vmin=low, vmax=high, cmap="viridis")
-        taxels = axes[1, column].imshow(counts[k], origin="lower", extent=extent, vmin=0.0, vmax=most, cmap="viridis")
+        image = axes[0, column].imshow(maps.maps_mm[k], origin="lower", extent=around_points(x, y), vmin=low, vmax=high,
+                                       cmap="viridis")
+        taxels = axes[1, column].imshow(counts[k], origin="lower", extent=(x[0], x[-1], y[0], y[-1]), vmin=0.0, vmax=most,
+                                        cmap="viridis")
         axes[0, column].set_title("" if maps.force_n is None else f"{maps.force_n[k]:g} N")
         axes[1, column].set_xlabel(f"x ({unit})")
     for axis, name in zip(axes[:, 0], ("deformation", "predicted taxels"), strict=True):
@@ -99,9 +102,9 @@ def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> Non
     save(figure, path)
 
 
-def _extent(maps):
-    """Extent of a map: in mm if the file has the grid, else in points."""
+def _grid(maps):
+    """Points x (n,) and y (m,) of a map, and their unit: mm if the file has the grid, else they are counted."""
     if maps.x_mm is None or maps.y_mm is None:
         height, width = maps.maps_mm.shape[1:]
-        return (0, width - 1, 0, height - 1), "points"
-    return (maps.x_mm[0], maps.x_mm[-1], maps.y_mm[0], maps.y_mm[-1]), "mm"
+        return range(width), range(height), "points"
+    return maps.x_mm, maps.y_mm, "mm"

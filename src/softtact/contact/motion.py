@@ -172,6 +172,11 @@ class Motion:
         """Displacements (step, 2) in mm along x and y from the motion's start to each step's end."""
         return np.cumsum([[step.ways.get("x", 0.0), step.ways.get("y", 0.0)] for step in self.steps], axis=0)
 
+    @property
+    def turned_deg(self) -> np.ndarray:
+        """Turns (step,) in degrees about the object's axis along z from the motion's start to each step's end."""
+        return np.cumsum([step.ways.get("rz", 0.0) for step in self.steps])
+
     def offsets_mm(self, *, at_most_mm: float = 0.5) -> np.ndarray:
         """Displacements (k, 2) in mm along x and y from the motion's start, at every step's end and at most `at_most_mm` apart."""
         places = [np.zeros(2)]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
@@ -47,8 +48,8 @@ def press_gel(sensor: "Sensor", placed: Trimesh, given: np.ndarray | Motion, con
     motion = given if isinstance(given, Motion) else Motion().press(force_n=list(given))
     spec, surface, layer = sensor.spec, HeightField.of(placed), sensor.prepared("elastic")
     touch = surface.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
-    _refuse_leaving(spec, surface, touch, motion)
     about = tuple(placed.bounds.mean(axis=0)[:2].tolist())
+    _refuse_leaving(spec, surface, touch, motion, about)
     mover = WideObject(layer, surface, (spec.map_x_mm, spec.map_y_mm), first_touch_mm=touch, friction=spec.friction.object,
                        about_mm=about)
     watch, steps, reached = Watch(control.label, limit_s=control.time_limit_s), list[WideStep](), control.reached
@@ -112,14 +113,14 @@ def _flags(spec: "BaseSpec", steps: Sequence[WideStep], depth: np.ndarray, touch
             **few_points(touching, of="map")}
 
 
-def _refuse_leaving(spec: "BaseSpec", surface: HeightField, touch: float, motion: Motion) -> None:
-    """Refuse a motion that takes the middle of what first touches off the gel."""
+def _refuse_leaving(spec: "BaseSpec", surface: HeightField, touch: float, motion: Motion, about: tuple[float, float]) -> None:
+    """Refuse a motion that takes the middle of what first touches off the gel; about: where the object turns about z."""
     low = surface.points_below(touch + _LOW_MM)
     half = 0.5 * np.asarray(spec.footprint_mm)
     low = low[(np.abs(low) <= half + 1e-9).all(axis=1)]
-    middle = low.mean(axis=0) if len(low) else np.zeros(2)
-    for number, way in enumerate(motion.aside_mm, start=1):
-        if (np.abs(middle + way) > half).any():
-            x, y = middle + way
+    arm = (low.mean(axis=0) if len(low) else np.zeros(2)) - about
+    turns = Rotation.from_euler("z", motion.turned_deg[:, None], degrees=True)
+    for number, (x, y) in enumerate(about + turns.apply([*arm, 0.0])[:, :2] + motion.aside_mm, start=1):
+        if (np.abs([x, y]) > half).any():
             raise InputError(f"Step {number} of the motion takes the object off {spec.name}: what touches first would be at "
                              f"x {x:.4g}, y {y:.4g} mm, and the gel ends at {half[0]:g} and {half[1]:g} mm; move it less far.")

@@ -11,6 +11,7 @@ from softtact.files import atomic_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
     from softtact.press.result import PressResult
 
@@ -77,6 +78,15 @@ def _rows(result, full_scale):
             yield _draw_reading, name, "", reading
 
 
+def around_points(x: "ArrayLike", y: "ArrayLike") -> tuple[float, float, float, float]:
+    """The extent of an image of values at even points x (n,) and y (m,): each cell has its point in the middle."""
+    sides = []
+    for points in (np.asarray(x, dtype=float), np.asarray(y, dtype=float)):
+        half = 0.5 * (points[1] - points[0])
+        sides += [float(points[0] - half), float(points[-1] + half)]
+    return sides[0], sides[1], sides[2], sides[3]
+
+
 def _half_sides(result):
     half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
     return half, (-half[0], half[0], -half[1], half[1])
@@ -86,8 +96,11 @@ def _draw_map(result, axis, step):
     axis.set_xlabel("x (mm)")
     deepest = float(result.deformation_map_mm.max()) or 1.0
     _outline(result, axis, step)
-    return axis.imshow(result.deformation_map_mm[step], origin="lower", extent=_half_sides(result)[1], vmin=0, vmax=deepest,
-                       cmap="viridis")
+    image = axis.imshow(result.deformation_map_mm[step], origin="lower", extent=around_points(result.x_mm, result.y_mm), vmin=0,
+                        vmax=deepest, cmap="viridis")
+    (x0, x1, y0, y1) = _half_sides(result)[1]
+    axis.set(xlim=(x0, x1), ylim=(y0, y1))     # half of the outermost cells lies beside the map
+    return image
 
 
 def _outline(result, axis, step):

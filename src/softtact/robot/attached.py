@@ -12,6 +12,7 @@ lowers the surface under another is left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -72,7 +73,7 @@ class Reading:
         return self.readings["taxels"]
 
 
-def attach(model: Any, body: str, sensor: Sensor | str, *, pose: Pose | Sequence[float] | np.ndarray | str | None = None,
+def attach(model: Any, body: str, sensor: Sensor | str | Path, *, pose: Pose | Sequence[float] | np.ndarray | str | None = None,
            source: str = "contacts", press: str = "elastic", objects: Sequence[str] | None = None,
            friction: float | None = None) -> "AttachedSensor":
     """Put a sensor on a body of a scene; read it with `AttachedSensor.read`.
@@ -92,7 +93,7 @@ def attach(model: Any, body: str, sensor: Sensor | str, *, pose: Pose | Sequence
     if not isinstance(model, mujoco.MjModel | mujoco.MjSpec):
         raise InputError(f"attach: the scene is a mujoco.MjSpec or MjModel, not {type(model).__name__}; read a file with "
                          "mujoco.MjSpec.from_file.")
-    sensor = load_sensor(sensor) if isinstance(sensor, str) else sensor
+    sensor = load_sensor(sensor) if isinstance(sensor, str | Path) else sensor
     _check_sensor(sensor, source, press)
     if friction is not None:
         sensor = sensor.with_friction(number("friction", friction, low=0.0))
@@ -116,6 +117,7 @@ class _Memory:
     held: dict[int, Any] = field(default_factory=dict)
     gels: dict[int, GelReadings] = field(default_factory=dict)
     last: dict[int, tuple[np.ndarray, PressResult]] = field(default_factory=dict)
+    followed: tuple[float, dict[int, np.ndarray]] = -np.inf, {}     # when gels were read, and poses (7,) of what they followed
 
 
 @dataclass
@@ -142,6 +144,10 @@ class AttachedSensor:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _memories=WeakKeyDictionary())
 
+    def begin(self, data: Any) -> None:
+        """Forget what touches in a state: an episode begins. Unasked it is forgotten where the state's time goes back."""
+        self._memories.pop(data, None)
+
     def read(self, data: Any) -> Reading:
         """The `Reading` of a mujoco.MjData, after mj_step or mj_forward.
 
@@ -164,10 +170,13 @@ class AttachedSensor:
         low = np.array([*(-0.5 * np.asarray(self.sensor.spec.footprint_mm) - _RIM_MM), -self.sensor.spec.thickness_mm])
         forces: dict[int, np.ndarray] = {}
         for contact, _, other, sign in contacts_of(data, self.geoms(data)):
-            body, gap = self.object_of(int(model.geom_bodyid[other])), max(data.contact[contact].dist, 0.0) / MM
-            at = turn.inv().apply(data.contact[contact].pos / MM - origin)
+            at, gap = turn.inv().apply(data.contact[contact].pos / MM - origin), max(data.contact[contact].dist, 0.0) / MM
             on_sensor = (at >= low).all() and (at <= [*-low[:2], _OVER_MM + gap]).all()
-            if on_sensor and (self.objects is None or body in self._named):
+            if on_sensor and other < 0 and self.objects is None:
+                raise InputError(f"A flex touches the sensor on {self.body!r}, which a sensor cannot press; name in 'objects' the "
+                                 "bodies that count.")
+            body = self.object_of(int(model.geom_bodyid[other]))
+            if on_sensor and other >= 0 and (self.objects is None or body in self._named):
                 force = turn.inv().apply(contact_force(model, data, contact, sign))
                 forces[body] = forces.get(body, np.zeros(3)) + force
         return {body: force for body, force in forces.items() if -force[2] >= _LEAST_N}
@@ -178,11 +187,11 @@ class AttachedSensor:
         One that reaches below the board is driven in where its middle is above the board, else it lies beneath and does not touch.
         """
         origin, turn = self.pose(data)
-        half = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
+        within = [*(0.5 * np.asarray(self.sensor.spec.footprint_mm)), self.sensor.spec.thickness_mm]
         depths = {}
         for body in self._named:
             centre = turn.inv().apply(data.xpos[body] / MM - origin)
-            if (np.abs(centre) > [*half, 0.0] + self._reach[body]).any():
+            if (np.abs(centre) > within + self._reach[body]).any():
                 continue
             placed = self._placed(data, body)
             lowest, middle = first_touch_mm(self.sensor, HeightField(placed)), placed.bounds[:, 2].mean()
@@ -227,8 +236,14 @@ class AttachedSensor:
         return self._named
 
     def object_of(self, body: int) -> int:
-        """The object that a body belongs to: itself where it is named, else the one that it is fixed to."""
-        return body if body in self._named else rigid_body_of(self._model, body)
+        """The object that a body belongs to: the named one that it is or hangs on without a joint, else the one it is fixed to."""
+        one, model = body, self._model
+        while one not in self._named:
+            above = int(model.body_parentid[one])
+            if one == 0 or model.body_weldid[above] != model.body_weldid[body]:
+                return rigid_body_of(model, body)
+            one = above
+        return one
 
     def geoms(self, data: Any) -> set[int]:
         """Numbers of the geoms of the sensor's body that the engine collides."""
@@ -323,18 +338,18 @@ class AttachedSensor:
 
     def _gel_reading(self, data, forces):
         """The reading of a gel, which follows the object that presses most from call to call."""
-        gels = self._bind(data).gels
-        for body in [*gels]:
-            if body not in forces:
+        memory, poses = self._bind(data), {body: _seven(self.object_pose(data, body)) for body in forces}
+        gels, (seen_s, before) = memory.gels, memory.followed
+        for body in [*gels]:     # one that left, or is elsewhere at the same time: in another episode, that is
+            if body not in forces or data.time <= seen_s and (np.abs(poses[body] - before[body]) > _STILL_MM).any():
                 del gels[body]
         spec, reason, result, readings = self.sensor.spec, "", None, None
         for body in sorted(forces, key=lambda one: forces[one][2])[:1]:
             if body not in gels:
                 gels[body] = GelReadings(self.sensor, self._mesh(body), spec.friction.object, self.press, spec.force_range_n[1])
-            pose = self.object_pose(data, body)
-            seven = np.concatenate([pose.translation_mm, pose.rotation.as_quat(scalar_first=True)])
-            readings, reason = gels[body].one(0, seven, forces[body])
+            readings, reason = gels[body].one(0, poses[body], forces[body])
             result = gels[body].result(0)
+        memory.followed = data.time, poses
         if len(forces) > 1:
             reason = f"{len(forces)} objects touch, and a gel follows the one that presses most" + f"; {reason}" * bool(reason)
         if readings is None:
@@ -347,6 +362,11 @@ class AttachedSensor:
     def _forces(self, forces):
         return {"force_n": np.sum([*forces.values(), np.zeros(3)], axis=0),
                 "objects": {name_of(self._model, body): force for body, force in forces.items()}}
+
+
+def _seven(pose):
+    """Numbers (7,) of a pose, as a grasp's record has them: mm and a quaternion."""
+    return np.concatenate([pose.translation_mm, pose.rotation.as_quat(canonical=True, scalar_first=True)])
 
 
 def _moved(before, now):

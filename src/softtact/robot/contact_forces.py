@@ -219,6 +219,6 @@ def _check(sensor, data):
     objects = sensor.object_numbers(data)
     for number, _, other, sign in contacts_of(data, sensor.geoms(data)):
         body = sensor.object_of(int(data.model.geom_bodyid[other]))
-        if body in objects and np.linalg.norm(contact_force(data.model, data, number, sign)) > 0:
+        if other >= 0 and body in objects and np.linalg.norm(contact_force(data.model, data, number, sign)) > 0:
             raise InputError(f"hand_back: the engine, too, pushes {name_of(data.model, body)!r} off {sensor.body!r}; set contype "
                              "and conaffinity of that body's geoms to 0, or exclude the pair.")

@@ -201,7 +201,7 @@ class GraspEnv(gymnasium.Env):
         self._data.ctrl[self._arm], self._data.ctrl[self._fingers] = self._joints, self._half_mm * MM
         self._aim, self._hand_mm = self._joints, np.zeros(2)     # targets of the arm's servos; offset of the hand: slide, lift
         mujoco.mj_forward(scene.model, self._data)
-        self._ground_mm = float(self._data.body("object").xpos[2] / MM)
+        self._ground_mm = self._height_mm()
 
     def _move_hand(self, lift, slide):
         """Set the arm's servos to the hand's place at the end of the step."""
@@ -229,7 +229,11 @@ class GraspEnv(gymnasium.Env):
         self._data.ctrl[self._fingers] = _CLOSED_M if closed else self._half_mm * MM
 
     def _risen_mm(self):
-        return float(self._data.body("object").xpos[2] / MM) - self._ground_mm
+        return self._height_mm() - self._ground_mm
+
+    def _height_mm(self):
+        """Of the object's middle of mass: its mesh may have its origin far from it, which rises where the object turns."""
+        return float(self._data.body("object").xipos[2] / MM)
 
     def _observe(self):
         poses, forces = loads_of([self])

@@ -19,13 +19,14 @@ from scipy.spatial.transform import Rotation
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import MotionStep
 from softtact.errors import ConvergenceError, InputError
-from softtact.geometry.meshes import place
+from softtact.geometry.meshes import check_over_sensor, place
 from softtact.imaging.depth_image import MovedObject
 from softtact.models.elastic.wide_sliding import WideObject, WideStep
 from softtact.press.gel import gel_result
 from softtact.press.kinds import layers_at_rest
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor
+from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.readout.registry import readings_of
 from softtact.robot.events import FINGERS, pose_of, set_down
 
@@ -44,6 +45,7 @@ class _Touch:
     def __init__(self, sensor: Sensor, mesh: trimesh.Trimesh, pose: np.ndarray) -> None:
         spec, self.sensor, self.friction = sensor.spec, sensor, sensor.spec.friction.object
         self.placed = place(mesh, pose=set_down(mesh, pose_of(pose)))
+        check_over_sensor(self.placed, spec.footprint_mm)
         surface, grid = HeightField(self.placed), (spec.map_x_mm, spec.map_y_mm)
         self.first_mm, self.about = surface.first_touch_mm(*grid), self.placed.bounds.mean(axis=0)[:2]
         self.mover = WideObject(sensor.prepared("elastic"), surface, grid, first_touch_mm=self.first_mm, friction=self.friction,
@@ -177,7 +179,9 @@ class GelReadings:
             self._touches.pop(finger, None)
             return self._at_rest, f"free, for {error}"
         if step is not before:
-            touch.result = gel_result(self.sensor, [step], [0.0], touch.object_at(step))
+            pressed = gel_result(self.sensor, [step], [0.0], touch.object_at(step))
+            pressed = flag_buried(pressed, float(touch.placed.bounds[1, 2]) - touch.first_mm)
+            touch.result = flag_overloaded(pressed, self.sensor.spec.force_range_n[1])
         result = touch.result
         assert result is not None     # made with the first step
         return {name: np.asarray(values)[0] for name, values in result.readings.items()}, str(result.validity_reason[0])

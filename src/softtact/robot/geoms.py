@@ -46,8 +46,14 @@ def name_of(model: Any, body: int) -> str:
 
 def geoms_of(model: Any, body: int) -> np.ndarray:
     """Numbers of a body's geoms: of those that collide, or of all where none does."""
-    first, count = model.body_geomadr[body], model.body_geomnum[body]
-    geoms = np.arange(first, first + count)
+    return _colliding(model, _all_geoms(model, body))
+
+
+def _all_geoms(model, body):
+    return model.body_geomadr[body] + np.arange(model.body_geomnum[body])
+
+
+def _colliding(model, geoms):
     collide = (model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)
     return geoms[collide] if collide.any() else geoms
 
@@ -58,13 +64,16 @@ def rigid_body_of(model: Any, body: int) -> int:
 
 
 def body_mesh(model: Any, body: int) -> trimesh.Trimesh:
-    """The geoms of a body (`geoms_of`) and of the bodies fixed to it in one mesh in mm, in the body's frame.
+    """The geoms of a body and of the bodies fixed to it in one mesh in mm, in the body's frame: those that collide, or all where
+    none does.
 
     They may overlap: a sensor touches their lower envelope. Meshes are the true ones, not their convex hulls.
     Raises InputError for a body without geoms, and for a plane or a height field, which have no sides.
     """
-    parts = [place(_geom_mesh(model, one, geom), pose=pose)
-             for one, pose in _fixed_to(model, body) for geom in geoms_of(model, one)]
+    fixed = _fixed_to(model, body)
+    geoms = _colliding(model, np.concatenate([_all_geoms(model, one) for one in fixed]))
+    parts = [place(_geom_mesh(model, int(model.geom_bodyid[geom]), geom), pose=fixed[int(model.geom_bodyid[geom])])
+             for geom in geoms]
     if not parts:
         raise InputError(f"The body {name_of(model, body)!r} has no geom that a sensor can press; give it one, or leave it out of "
                          "'objects'.")
@@ -72,14 +81,14 @@ def body_mesh(model: Any, body: int) -> trimesh.Trimesh:
 
 
 def _fixed_to(model, body):
-    """(number, pose in the body's frame) of a body and of those that hang on it without a joint."""
+    """{number: pose in the body's frame} of a body and of those that hang on it without a joint."""
     found = {body: Pose(np.zeros(3))}
     for one in range(body + 1, model.nbody if body else 0):     # a parent has a lower number than its children
         parent = found.get(int(model.body_parentid[one]))
         if parent is not None and model.body_weldid[one] == model.body_weldid[body]:
             turn = Rotation.from_quat(model.body_quat[one], scalar_first=True)
             found[one] = Pose(parent.apply(model.body_pos[[one]] / MM)[0], parent.rotation * turn)
-    return found.items()
+    return found
 
 
 def _geom_mesh(model, body, geom):
@@ -103,7 +112,7 @@ def _geom_mesh(model, body, geom):
 def contacts_of(data: Any, geoms: Collection[int]) -> Iterator[tuple[int, int, int, float]]:
     """(number of the contact, geom of `geoms`, other geom, sign) of each contact through which geoms can press each other.
 
-    With a margin geoms press before they touch.
+    With a margin geoms press before they touch. The other geom is -1 where a flex touches.
 
     sign: of MuJoCo's force on the geom of `geoms`, as it acts on the second of a pair
     """

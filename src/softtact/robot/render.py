@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from softtact.drawing import drawn_apart
 from softtact.errors import InputError
 from softtact.outputs import temporary_folder
-from softtact.press.plot import save
+from softtact.press.plot import around_points, save
 from softtact.processes import start_tied
 from softtact.robot.arm import JOINTS
 from softtact.robot.events import GraspRecord
@@ -178,7 +178,8 @@ def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: Sequence[np.
 def _draw_fingers(data, grid, name):
     """Images of an array for each event and finger on axes (event, 2), all of one scale, which is that of the last image."""
     highest = max(float(data[name].max()), 1e-9)
-    extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+    points = name == "deformation_map_mm"     # the others are cells side by side
+    extent = around_points(data.x, data.y) if points else [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
     for (event, finger), axes in np.ndenumerate(grid):
         force, model = -float(data.force_n[int(data.event_row[event]), finger, 2]), data.model.values[event, finger]
         axes.set_title(f"{data.finger.values[finger]}, {force:.3g} N\n{model}", fontsize=8)

@@ -209,7 +209,7 @@ def _add_object(robot, mesh, settings, placement, mass):
                   conaffinity=1, friction=(settings.friction, settings.friction * TORSION_M, 0.0), priority=1, **PAD_CONTACT)
     robot.add_equality(name="fixture", type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1="carriage",
                        name2="object", solref=(_FIXTURE_TIME_S, 1), solimp=_RIGID,
-                       data=[*[0] * 10, _TURNING, 0])     # about the object's origin, in the pose that it begins with
+                       data=[*mesh.bounds.mean(axis=0) * MM, *[0] * 7, _TURNING, 0])     # about its middle, in the pose that it has
 
 
 def _object_in_sensor(mesh, placement):

@@ -54,7 +54,7 @@ class _Place(Ladder):
 
 @dataclass
 class TaxelMemory:
-    """Counts of both sensors under one object.
+    """Counts of both sensors under one object. Places are those of its middle, wherever the mesh has its origin.
 
     model: elastic or foundation;  largest_force_n: limit of the forces
     step_mm: of the grid of places along x and y;  device: cpu, cuda or auto: a GPU where there is one, for the elastic model
@@ -76,6 +76,8 @@ class TaxelMemory:
         self.sensor.spec.need_taxels("the environment")
         need_whole_counts(self.sensor.spec, "the environment")
         self.device = batch_device(self.sensor, self.model, self.device)
+        self._middle = self.mesh.bounds.mean(axis=0)
+        self.mesh = place(self.mesh, pose=Pose(-self._middle))
         side = min(self.sensor.spec.footprint_mm)
         if not 0 < self.step_mm < side:
             raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
@@ -147,12 +149,12 @@ class TaxelMemory:
             relative[row] = max(relative[row], ladder.relative_error[levels[row]])
         return counts_of(self.sensor.spec, carried), relative * rms(carried)
 
-    @staticmethod
-    def _places(fingers, poses):
-        """x, y in mm and the rotation about z in degrees (k, 3) of poses (k, 7); the tilt is left out."""
+    def _places(self, fingers, poses):
+        """x, y in mm of the middle and the rotation about z in degrees (k, 3) of poses (k, 7); the tilt is left out."""
         facing = Rotation.concatenate([_FACING[finger].inv() for finger in fingers])
-        seen = (facing * Rotation.from_quat(poses[:, 3:], scalar_first=True)).as_quat()
-        return np.column_stack([poses[:, :2], np.degrees(2 * np.arctan2(seen[:, 2], seen[:, 3]))])
+        turn = Rotation.from_quat(poses[:, 3:], scalar_first=True)
+        seen, middle = (facing * turn).as_quat(), poses[:, :3] + turn.apply(self._middle)
+        return np.column_stack([middle[:, :2], np.degrees(2 * np.arctan2(seen[:, 2], seen[:, 3]))])
 
     def _beside(self, at):
         """Numbers (3,) of the places on both sides along x, with their weights; one place where it is near."""

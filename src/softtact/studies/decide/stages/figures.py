@@ -8,6 +8,7 @@ from matplotlib.patches import Patch
 
 from softtact.evaluation.paired import compare
 from softtact.files import read_csv, read_dataset
+from softtact.press.plot import around_points
 from softtact.reporting.style import colour, pyplot, save
 from softtact.studies.decide.scoring import MEAN_READING
 
@@ -29,8 +30,8 @@ def draw_maps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     step = int(steps[-1]) if len(steps) else 0
     figure = pyplot().figure(figsize=(1.9 * len(presses), 3.8), layout="constrained")
     for axes, (model, press) in zip(figure.subplots(1, len(presses), sharey=True), presses.items(), strict=True):
-        extent = [float(press[axis][end]) for axis in ("x", "y") for end in (0, -1)]
-        image = axes.imshow(press.deformation_map_mm.values[step], origin="lower", extent=extent, cmap="viridis", vmin=0)
+        image = axes.imshow(press.deformation_map_mm.values[step], origin="lower", extent=around_points(press.x, press.y),
+                            cmap="viridis", vmin=0)
         axes.set_title(model.replace("_", " "), fontsize=8)
         axes.set_xlabel("x (mm)")
         figure.colorbar(image, ax=axes, orientation="horizontal", label="towards the PCB (mm)", shrink=0.9)

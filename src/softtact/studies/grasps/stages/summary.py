@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.files import read_csv, read_dataset, write_csv
+from softtact.press.plot import around_points
 from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def draw_one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings:
     figure: Figure = pyplot().figure(figsize=(2.6 * models + 0.6, 3.4 * len(compared)), layout="constrained")
     grid = figure.subplots(len(compared), models, squeeze=False)
     for axes, (name, data) in zip(grid, compared.items(), strict=True):
-        extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+        extent = around_points(data.x, data.y)
         deepest = float(data.deformation_map_mm.max())
         for place, model, values, share in zip(axes, data.model.values, data.deformation_map_mm.values, data.lower_share.values,
                                                strict=True):
