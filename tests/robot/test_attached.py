@@ -141,6 +141,7 @@ CLOTH = """<flexcomp name="cloth" type="grid" dim="2" count="5 5 1" spacing=".00
   mass=".1"/>"""
 
 
+@pytest.mark.filterwarnings("ignore:flex 'cloth' is not rigid")
 def test_a_cloth_that_touches_is_refused_and_left_out_where_objects_are_named(coro):
     read = []
     for objects in (None, ["box"]):
