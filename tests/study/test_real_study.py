@@ -147,6 +147,24 @@ def test_forces_of_a_known_modulus_give_it_back_and_check_points_stay_unfitted(t
     assert not table[table.depth_mm == 1.0].fitted.any()
 
 
+def test_a_modulus_that_takes_a_point_beyond_the_computed_depths_is_not_the_one_of_all_points(tmp_path):
+    """Twice as stiff at the second point. The modulus of the first has it beyond the path, which counted as no error."""
+    depths, none = np.array([0.0, 0.5, 1.0, 1.5]), np.zeros((4, 1))
+    write_path(tmp_path / "path.nc", DiscPress(depths, depths**1.5, np.zeros(1), none, none), {})
+    points = [{"depth_mm": 0.5, "force_n": 0.5**1.5}, {"depth_mm": 1.5, "force_n": 2 * 1.5**1.5}]
+    settings = {"gel_force": {"ball_mm": 7.5, "height_mm": 4.0, "source": "made", "points": points, "check_points": [],
+                              "depths_mm": [0.5, 1.0, 1.5], "judged": "only", "variants": {"only": {"bulk_over_shear": 20}}}}
+    fit_modulus(inputs={"path_only": tmp_path / "path.nc"}, outputs={"table": tmp_path / "t.csv", "facts": tmp_path / "f.json"},
+                settings=settings)
+    table = pd.read_csv(tmp_path / "t.csv")
+    own = table[(table.variant == "only") & (table.fitted_to == "all")]
+    assert own.shear_modulus_mpa.to_numpy() == pytest.approx(2.0) and own.depth_error.notna().all()
+    assert own.depth_error.iloc[0] == pytest.approx(0.5 ** (2 / 3) - 1, abs=0.1)     # of the path's interpolation
+    judged = claims_of_real(tables(0.0, 0.2, 3.0) | {"gel_force": table}, limits={}, made={"s": False}, stated={"s": None},
+                            markers_made=False, sheared=[], judged="only").iloc[:2]
+    assert set(judged.verdict) == {NOT} and "beyond the computed depths (predicted)" in judged.ours.iloc[1]
+
+
 @pytest.mark.slow     # its parts are tested in tests/imaging/test_marker_motion.py
 def test_a_gel_is_fitted_to_a_drawn_image_and_compared(tmp_path):
     values = {"middle_px": [160, 120], "centre_px": [137, 123], "ball_px": 94.0, "distance_px": 450.0}
@@ -191,6 +209,28 @@ def verdicts(*numbers, made=False, stated=20.0, **options):
     found = claims_of_real(tables(*numbers, **options), limits={"s": 4.0}, made={"s": made}, stated={"s": stated},
                            markers_made=made, sheared=["shear"], judged="b")
     return found.set_index("claim").verdict
+
+
+def of_force(**columns):
+    """Verdict and words of both claims on the force, of rows with the columns fitted_to, depth_error and fitted."""
+    given = pd.DataFrame({"variant": "b", "depth_mm": range(len(columns["fitted"])), **columns})
+    layer = pd.DataFrame([{"variant": "elastic layer", "fitted_to": "all", "depth_mm": 0.5, "depth_error": 0.0, "fitted": True}])
+    found = claims_of_real(tables(0.04, 0.2, 3.0) | {"gel_force": pd.concat([given, layer])}, limits={}, made={"s": False},
+                           stated={"s": None}, markers_made=False, sheared=[], judged="b").iloc[:2]
+    return list(zip(found.verdict, found.ours, strict=True))
+
+
+def test_a_depth_beyond_those_computed_is_no_error_of_nothing():
+    both = of_force(fitted_to=["all", "all", "0.5 mm", "0.5 mm"], depth_error=[0.01, np.nan, 0.0, np.nan],
+                    fitted=[True, True, True, False])
+    assert [verdict for verdict, _ in both] == [NOT, NOT]
+    assert all("largest error beyond the computed depths" in words for _, words in both)
+
+
+def test_a_point_that_is_checked_with_the_modulus_of_all_points_does_not_judge_that_of_one():
+    (of_all, words), (of_one, _) = of_force(fitted_to=["all", "all", "0.5 mm"], depth_error=[0.01, 0.9, 0.01],
+                                            fitted=[True, False, False])
+    assert (of_all, of_one) == (NOT, REPRODUCED) and "90.0% (fitted, or predicted with it)" in words
 
 
 def test_goals_that_are_met_are_reproduced_and_others_not():

@@ -35,13 +35,19 @@ def _force(table, judged):
     points = table.depth_mm.nunique()
     for to, words in (("all", "One modulus gives the depth of every measured force"),
                       ("one", "A modulus fitted to one measured force gives the depth of another")):
-        own = table[(table.variant == judged) & ((table.fitted_to == "all") if to == "all" else ~table.fitted)]
-        worst = own.depth_error.abs().max()
-        layer = table[(table.variant == ELASTIC) & (table.fitted_to == "all")].depth_error.abs().max()
+        with_all = table.fitted_to == "all"
+        own = table[(table.variant == judged) & (with_all if to == "all" else ~table.fitted & ~with_all)]
+        worst, layer = (one.depth_error.abs().max(skipna=False) for one in (own, table[(table.variant == ELASTIC) & with_all]))
+        how = "fitted, or predicted with it" if to == "all" else "predicted"
         yield row(words, "force on a GelSight Mini", f"within {DEPTH_ERROR:.0%}",
-                  f"largest error {worst:.1%} ({'fitted' if to == 'all' else 'predicted'}); layer {layer:.1%}, fitted",
+                  f"largest error {_depth_error(worst)} ({how}); layer {_depth_error(layer)}, fitted, or predicted with it",
                   verdict_of(bool(worst <= DEPTH_ERROR)), f"depth at the measured force, variant {judged}", "tables/gel_force.csv",
                   uncertainty=f"{points} points; variants of contact and compressibility in the table")
+
+
+def _depth_error(worst):
+    """A largest error in words; nan where the depth of a measured force is beyond the path."""
+    return "beyond the computed depths" if pd.isna(worst) else f"{worst:.1%}"
 
 
 def _markers(table, others, made, sheared):

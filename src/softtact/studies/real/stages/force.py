@@ -13,6 +13,7 @@ from softtact.progress import Watch
 from softtact.studies.real.paths import read_path, write_path
 
 ELASTIC = "elastic layer"       # linear, frictionless, of endless width
+_ROUNDING = 1e-9                # of the path's last force, which the force at its last depth may exceed by round-off
 
 
 def press_ball(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -34,8 +35,9 @@ def fit_modulus(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     table = pd.concat([_of_variant(name, path, ratio, points, checks) for name, (path, ratio) in curves.items()])
     write_csv(outputs["table"], table)
     fitted = table[(table.variant == values["judged"]) & (table.fitted_to == "all")]
+    worst = float(fitted.depth_error.abs().max(skipna=False))
     write_json(outputs["facts"], {"variant": values["judged"], "c10_mpa": float(fitted.c10_mpa.iloc[0]),
-                                  "largest_depth_error": float(fitted.depth_error.abs().max()), "source": values["source"]})
+                                  "largest_depth_error": worst if np.isfinite(worst) else None, "source": values["source"]})
 
 
 def _curves(name, inputs, values):
@@ -73,20 +75,27 @@ def _of_variant(name, path, young_over_shear, points, checks):
 
 def _predicted(path, shear, depth, force):
     """Depth at a measured force and force at a measured depth, with their relative errors; no depth beyond the path."""
-    near = float(path.depth_at(force / shear)) if force / shear <= path.force_over_shear[-1] else np.nan
+    near = float(path.depth_at(force / shear)) if _on_path(path, force / shear) else np.nan
     load = float(path.at(depth)) * shear
     return {"predicted_depth_mm": near, "depth_error": near / depth - 1, "predicted_force_n": load, "force_error": load / force - 1}
 
 
+def _on_path(path, force_over_shear):
+    """Whether the path of depths was computed as far as a force."""
+    return force_over_shear <= path.force_over_shear[-1] * (1 + _ROUNDING)
+
+
 def _one_modulus(path, points):
-    """The shear modulus whose largest relative error of the depth is least."""
+    """The shear modulus whose largest relative error of the depth is least, among those with all points on the path."""
     each = [force / float(path.at(depth)) for depth, force in points]
     low, high = min(each), max(each)
     if high - low < 1e-9 * high:
         return low
 
     def worst(shear):
-        return max(abs(float(path.depth_at(min(force / shear, path.force_over_shear[-1]))) / depth - 1) for depth, force in points)
+        if not all(_on_path(path, force / shear) for _, force in points):
+            return np.inf
+        return max(abs(float(path.depth_at(force / shear)) / depth - 1) for depth, force in points)
 
-    tried = np.linspace(low, high, 400)
+    tried = np.linspace(high, low, 400)     # from the stiffest, which has all points on the path
     return float(tried[np.argmin([worst(one) for one in tried])])
