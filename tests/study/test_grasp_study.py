@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 import xarray
@@ -15,7 +16,7 @@ from softtact.geometry.pose import Pose
 from softtact.studies.cost import read_costs
 from softtact.studies.grasps.claims import claims_of_grasps
 from softtact.studies.grasps.config import GraspStudy
-from softtact.studies.grasps.stages.summary import _result, papers_model
+from softtact.studies.grasps.stages.summary import _facts, _result, papers_model
 from softtact.studies.jobs import run_jobs
 from softtact.studies.registry import OpenStudy, open_study
 
@@ -111,7 +112,8 @@ def test_a_fault_of_the_configuration_is_named(tmp_path, changes, said):
 
 
 GRASP = {"grasp": "a-0", "object": "a", "status": "done", "trials": 50, "force_left_n": 50.0, "force_right_n": 50.0,
-         **{f"{name}_{side}": "elastic" for name in ("model_contact", "model_grip", "rule") for side in ("left", "right")}}
+         **{f"{name}_{event}_{side}": "elastic" for name in ("model", "rule") for event in ("contact", "grip")
+            for side in ("left", "right")}}
 
 
 def verdicts(row, shares):
@@ -132,10 +134,33 @@ def test_claims_hold_by_their_rules_alone():
     good = verdicts(GRASP, [0.02, 0.6])
     assert good["A"] == good["The"] == "reproduced" and good["Twelve"] == "not reproduced"
     assert verdicts(GRASP | {"model_grip_left": "hyperelastic"}, [0.02, 0.6])["A"] == "not reproduced"
+    turned = GRASP | {f"{name}_contact_left": "hyperelastic" for name in ("model", "rule")}
+    assert verdicts(turned, [0.02, 0.6])["A"] == "reproduced"      # each event by the rule at its own pose
     assert verdicts(GRASP | {"force_left_n": 48.0}, [0.02, 0.6])["The"] == "not reproduced"
     for shares in ([0.02, 0.6], [0.2, 0.6], [0.02, 0.2]):      # one event, and no truth beside the two models
         assert verdicts(GRASP, shares)["In"] == "undecided"
     assert good["SSIM"] == "needs the archive"
+
+
+def test_a_study_whose_grasps_all_failed_decides_nothing_on_the_rule():
+    failed = pd.DataFrame([{"grasp": "a-0", "object": "a", "status": "failed", "message": "x"}])
+    table = claims_of_grasps(failed, {}, force_n=50.0, policy="paper", model="auto")
+    assert table.verdict[0] == "undecided" and table.ours[0] == "no grasp was done"
+
+
+def test_each_event_is_judged_by_the_rule_at_its_own_pose(tmp_path):
+    """The key of the last test, whose teeth come over the pad between contact and grip."""
+    study = load_grasp_study(config(tmp_path, objects=["key"]))
+    poses = [Pose.from_values([0, 0, 0, 0, 0, 0]), Pose.from_values([2.46, -4.96, 0, 0, 0, 148.44])]
+    row = [[[*pose.translation_mm, *pose.rotation.as_quat(scalar_first=True)]] * 2 for pose in poses]
+    events = xarray.Dataset(
+        {"event_row": ("event", [0, 1]), "time_s": ("time", [0.1, 0.2]), "object_pose_sensor": (("time", "finger", "pose"), row),
+         "force_n": (("time", "finger", "axis"), np.full((2, 2, 3), -50.0)),
+         "model": (("event", "finger"), np.full((2, 2), "elastic")), "within_validity": (("event", "finger"), np.ones((2, 2))),
+         "deformation_map_mm": (("event", "finger", "y", "x"), np.zeros((2, 2, 3, 3)))}, coords={"finger": ["left", "right"]})
+    read = xarray.Dataset({"tactile_map": (("finger", "trial", "row", "column"), np.zeros((2, 2, 7, 4)))})
+    facts = _facts(events, read, read_mesh(study.items[0].entry.file, unit="mm"), study.spec)
+    assert [facts[f"rule_{event}_left"] for event in ("contact", "grip")] == ["elastic", "hyperelastic"]
 
 
 def test_the_rule_is_asked_for_the_place_of_an_object_not_for_its_middle(tmp_path):

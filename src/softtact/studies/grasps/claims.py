@@ -30,7 +30,8 @@ def claims_of_grasps(
 
 def _triggered(done, model, policy):
     claim = "A collision of sensor and object starts the chosen model, from the object's pose and the force"
-    rule = "at each contact and each grip both fingers that touch were pressed, by the model that the paper's rule takes"
+    rule = ("at each contact and each grip both fingers that touch were pressed, by the model that the paper's rule takes for the "
+            "object's pose there")
     if model != "auto" or policy != "paper":
         return row(
             claim,
@@ -41,7 +42,10 @@ def _triggered(done, model, policy):
             "needs model: auto and policy: paper",
             "grasps.csv",
         )
-    both = [(done[f"model_{event}_{side}"], done[f"rule_{side}"]) for event in ("contact", "grip") for side in ("left", "right")]
+    if not len(done):
+        return row(claim, "sec. 3.3", "described", "no grasp was done", UNDECIDED, rule, "grasps.csv")
+    places = [f"{event}_{side}" for event in ("contact", "grip") for side in ("left", "right")]
+    both = [(done[f"model_{place}"], done[f"rule_{place}"]) for place in places]
     pressed = int(sum((taken != "none").sum() for taken, _ in both))
     agree = int(sum(((taken == ruled) & (taken != "none")).sum() for taken, ruled in both))
     return row(

@@ -125,15 +125,17 @@ def _facts(data, readings, mesh, spec):
     from softtact.geometry.meshes import place
     from softtact.robot.events import pose_of, set_down
 
-    at = int(data.event_row[GRIP])
+    contact, at = (int(data.event_row[event]) for event in (0, GRIP))
     row = {"status": "done", "message": "", "trials": readings.sizes["trial"],
-           "contact_s": float(data.time_s[int(data.event_row[0])]), "grip_s": float(data.time_s[at])}
+           "contact_s": float(data.time_s[contact]), "grip_s": float(data.time_s[at])}
     for finger, name in enumerate(map(str, data.finger.values)):
-        placed = place(mesh, pose=set_down(mesh, pose_of(data.object_pose_sensor.values[at, finger])))
+        placed = {event: place(mesh, pose=set_down(mesh, pose_of(data.object_pose_sensor.values[record, finger])))
+                  for event, record in (("contact", contact), ("grip", at))}
         spread = readings.tactile_map.values[finger].std(axis=0, ddof=1) if readings.sizes["trial"] > 1 else np.zeros(1)
         row |= {f"force_{name}_n": -float(data.force_n[at, finger, 2]), f"model_contact_{name}": data.model.values[0, finger],
                 f"model_grip_{name}": data.model.values[GRIP, finger],
-                f"rule_{name}": papers_model(placed, footprint_mm=spec.footprint_mm, reach_mm=spec.thickness_mm),
+                **{f"rule_{event}_{name}": papers_model(one, footprint_mm=spec.footprint_mm, reach_mm=spec.thickness_mm)
+                   for event, one in placed.items()},
                 f"valid_{name}": int(data.within_validity[GRIP, finger]),
                 f"deepest_{name}_mm": float(data.deformation_map_mm[GRIP, finger].max()),
                 f"at_range_end_{name}": int((readings.tactile_map[finger] >= spec.largest_counts).any("trial").sum()),
