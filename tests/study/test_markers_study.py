@@ -23,7 +23,7 @@ from softtact.studies.markers.config import load_study, read_values
 from softtact.studies.markers.drag import DragSequence, drag_fragment
 from softtact.studies.markers.jobs import jobs
 from softtact.studies.markers.judging import sliding_verdicts, wrong_objects
-from softtact.studies.markers.pressing import reduced, sequence_file
+from softtact.studies.markers.pressing import _labels, reduced, sequence_file
 from softtact.studies.markers.scoring import (
     COLUMNS,
     Camera,
@@ -37,6 +37,7 @@ from softtact.studies.markers.scoring import (
 )
 from softtact.studies.markers.shapes import OBJECTS, generated_object
 from softtact.studies.markers.stages.comparing import read_markers
+from softtact.studies.markers.stages.data import pairs_of
 
 PRINTED = paths.Path((-4, 0, 4), tuple(range(-90, 91, 30)), 0.1, 1.5, 1.0)
 SMALL = paths.Path((0.0,), (0.0, 30.0), 0.25, 0.5, 0.5)
@@ -56,6 +57,16 @@ def test_the_printed_split_holds_fifteen_poses_of_each_trained_object_out():
     assert {split: len(found) for split, found in poses.items()} == {"train": 48, "held_out": 15, "unseen": 63}
     assert not poses["train"] & poses["held_out"]
     assert {p.object for p in plans if p.split == "unseen"} == {"cone"}
+
+
+def test_the_whole_plan_has_exactly_the_pairs_that_the_paper_counts():
+    """574,560 frames of 30,240 sequences, which share their ways down."""
+    every = tuple(np.arange(1, 16) / 10)
+    share = paths.Share(48, 15, 63, every, every, 15)
+    found = paths.plans(PRINTED, share, train=OBJECTS[:8], test=OBJECTS[8:], seed=3)
+    frames = [_labels(plan, number, PRINTED) for number, plan in enumerate(found)]
+    labels = pd.DataFrame({name: np.concatenate([one[name] for one in frames]) for name in frames[0]})
+    assert len(labels) == 574_560 and len(pairs_of(labels)) == paths.PAIRS_PRINTED
 
 
 def test_a_share_is_a_part_of_the_whole_split():

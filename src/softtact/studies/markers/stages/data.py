@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Friction at which hardly a point slides, some in a million at the edges of a tetrahedron; with 1000 such edges may not settle.
 FULL_STICK = 10.0
+_OF_A_PAIR = ["object", "pose_x_mm", "pose_y_mm", "pose_angle_deg", "depth_mm", "aside_mm", "aside"]
+_DECIMALS = 6      # of lengths in mm: the same depth of two sequences differs by round-off
 _FRICTION = {"full_stick": FULL_STICK, "linear_frictionless": 0.0}
 
 
@@ -99,17 +101,28 @@ def sensor_with(file: str | Path, friction: float | None) -> "Sensor":
     return sensor if friction is None else sensor.with_friction(friction)
 
 
+def pairs_of(labels: pd.DataFrame) -> pd.DataFrame:
+    """The different pairs of images among frames, as the paper counts them.
+
+    Sequences of a pose share their way down, so each depth counts once, and each place aside from a depth once.
+    labels: a row for each frame, with the columns `pressing.LABELS`
+    """
+    pressed = labels.loc[labels.depth_mm > 0, _OF_A_PAIR].round(_DECIMALS)
+    return pressed.assign(aside=pressed.aside.where(pressed.aside_mm > 0, "")).drop_duplicates()
+
+
 def list_data(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """List the sequences of the data set, and state its size.
 
     inputs: sequences (list);  outputs: manifest (CSV, a row for each sequence), facts (JSON)
     settings: path, generated (names of generated objects), objects (number)
     """
-    rows, facts = [], []
+    rows, facts, pairs = [], [], []
     for file in inputs["sequences"]:
         data = read_dataset(file)
         facts.append(facts_of(data))
         frame = pd.DataFrame({name: data[name].values for name in LABELS} | {"slip_share": data.slip_share.values})
+        pairs.append(pairs_of(frame))
         for _, one in frame.groupby("sequence"):
             first = one.iloc[0]
             rows.append(
@@ -122,13 +135,12 @@ def list_data(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
             )
     write_csv(outputs["manifest"], pd.DataFrame(rows).sort_values("sequence"))
     path = paths.Path(**settings["path"])
-    frames = sum(one["frames"] for one in facts)
     write_json(
         outputs["facts"],
         {
             "sequences": sum(one["sequences"] for one in facts),
-            "frames": frames,
-            "share_of_printed_pairs": frames / paths.PAIRS_PRINTED,
+            "frames": sum(one["frames"] for one in facts),
+            "share_of_printed_pairs": len(pd.concat(pairs)) / paths.PAIRS_PRINTED,
             "pairs_of_object": path.pairs(),
             "poses": len(path.poses),
             "largest_force_n": max(one["largest_force_n"] for one in facts),
