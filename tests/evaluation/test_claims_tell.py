@@ -204,6 +204,8 @@ def test_height_counts_where_several_heights_were_run_at_the_largest_way_of_the_
     hardness = pd.DataFrame({"tissue": "a", "jaw_mm": [1.0, 3.0] * 2, "tissue_height_mm": [12.0, 12.0, 15.0, 15.0],
                              "relative_hardness_n_mm": [30.0, 50.0, 60.0, last]})  # fmt: skip
     assert by_start(of_probe(hardness), "F/d does not depend")["verdict"] == verdict
+    off = hardness.assign(jaw_mm=[1.0, 3.0, 1.0, np.nextafter(3, 4)])     # a sum of other steps
+    assert by_start(of_probe(off), "F/d does not depend")["verdict"] == verdict
     one = of_probe(hardness[hardness.tissue_height_mm == 12])
     assert not any(row["claim"].startswith("F/d does not depend") for row in one)
 

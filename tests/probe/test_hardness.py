@@ -21,6 +21,12 @@ def test_a_measure_is_judged_by_its_worst_change():
     assert own.contrast == pytest.approx(2.5) and own.apart and own.heights == 2
 
 
+def test_displacements_that_differ_by_round_off_are_the_same():
+    """The jaw's displacement is a sum of steps, which differs by height in its last digit."""
+    off = TABLE.assign(jaw_mm=TABLE.jaw_mm.where((TABLE.jaw_mm < 2) | (TABLE.tissue_height_mm == 10), np.nextafter(2, 3)))
+    assert off.jaw_mm.nunique() == 3 and verdict(off, "index") == verdict(TABLE, "index")
+
+
 def test_values_that_overlap_do_not_tell_tissues_apart():
     assert not verdict(TABLE.assign(index=np.where(TABLE.tissue == "hard", 0.7, 1.0) * TABLE["index"]), "index").apart
 

@@ -76,6 +76,8 @@ SEARCH = {"tissue": "rubber", "width": 6, "height": 5, "x": [5, 14.5, 24, 33.5],
 
 
 @pytest.mark.parametrize(("changes", "said"), [
+    ({"load_n": {"to": 5, "by": 5}}, "load_n: steps of 5 up to 5 are one, .* two or more; make load_n.by 2.5 or less"),
+    ({"displacement_mm": {"to": 2, "by": 4}}, "displacement_mm: steps of 4 up to 2 are one, .* make displacement_mm.by 1 or less"),
     ({"hardness": {"tissue_heights": [15, 2], "shares": [0.75, 1]}},
      "hardness.tissue_heights of 2 mm: .*jaw's displacement of 2 mm is more than the tissue's height"),
     ({"search": SEARCH | {"width": 10}}, "search.x is from 5 to 33.5 mm, where a lump with a search.width of 10 mm leaves"),

@@ -337,7 +337,12 @@ def refuse_search(design: PalpationDesign, search: LumpSearch) -> None:
 
 
 def _refuse_studies(design, where):
-    """Refuse what would fail only after the sweeps: heights of tissue that the jaw presses through, and searches."""
+    """Refuse what would fail only after the sweeps: one step, heights of tissue that the jaw presses through, and searches."""
+    for name in ("load_n", "displacement_mm"):
+        steps = getattr(design, name)
+        if len(steps.values) < 2:     # a slope needs two
+            raise InputError(f"{where}: {name}: steps of {steps.by:g} up to {steps.to:g} are one, and a sweep needs two or more; "
+                             f"make {name}.by {0.5 * steps.to:g} or less.")
     for height in design.hardness.tissue_heights if design.hardness else ():
         try:
             design.with_(geometry={"tissue_height": height}, variants={}, hardness=None, search=None)

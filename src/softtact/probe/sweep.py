@@ -187,12 +187,17 @@ class HardnessVerdict:
     """How many heights of tissue the table holds."""
 
 
+def at_largest_displacement(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a `hardness_table` at the jaw's largest displacement, which sums of steps reach up to round-off."""
+    return table[np.isclose(table.jaw_mm, table.jaw_mm.max(), rtol=1e-9, atol=0.0)]
+
+
 def verdict(table: pd.DataFrame, column: str) -> HardnessVerdict:
     """`HardnessVerdict` of a column of `hardness_table`."""
     def change(groups):
         return float(max(group.max() / group.min() - 1 for _, group in groups))
 
-    last = table[table.jaw_mm == table.jaw_mm.max()]
+    last = at_largest_displacement(table)
     ranges = table.groupby("tissue")[column].agg(["min", "max"]).sort_values("min")
     by_height = last.groupby("tissue_height_mm")[column]
     return HardnessVerdict(change(table.groupby(["tissue", "tissue_height_mm"])[column]), change(last.groupby("tissue")[column]),

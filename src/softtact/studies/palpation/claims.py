@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.evaluation.decisions import COLUMNS, UNDECIDED, interval_inside, row
+from softtact.probe.sweep import at_largest_displacement
 
 PRINTED_N_MM = {"ecoflex_00_30": 55.218, "dragon_skin_20": 79.204}     # sec. IV, the slopes of figure 4
 _SOFT_FIRST = tuple(PRINTED_N_MM)
@@ -126,7 +127,7 @@ def _one_load(curves, mesh_error):
 
 
 def _height(hardness, mesh_error):
-    last = hardness[hardness.jaw_mm == hardness.jaw_mm.max()]
+    last = at_largest_displacement(hardness)
     change = last.groupby("tissue").relative_hardness_n_mm.agg(lambda values: values.max() / values.min() - 1)
     changes = "; ".join(f"{name}: changes by {value:.1%}" for name, value in change.items())
     return row("F/d does not depend on the tissue's height", "eq. 3", "not claimed: C is for one geometry", changes,
