@@ -127,6 +127,32 @@ def test_baselines_of_which_none_is_that_of_the_topic_read_are_told_and_one_is_n
     assert (read_bag(path, topics=["/left/data"], baseline="subtracted").counts.values == 9100).all()
 
 
+@pytest.mark.parametrize(("count", "words"), [(56, "56"), (3, "other")])
+def test_a_named_baseline_of_another_number_of_taxels_is_refused_with_both_topics(tmp_path, count, words):
+    kind = "std_msgs/msg/Int32MultiArray"
+    path = bag_of(tmp_path / "b.mcap", [("/pair/baseline", kind, 1, array([9000] * count)),
+                                        *(("/one/data", kind, k + 1, array([9100] * 28)) for k in range(3))])
+    with pytest.raises(InputError, match=rf"the baseline /pair/baseline has {words} numbers and /one/data has 28; .*\(--topic\)"):
+        read_bag(path, topics=["/one/data", "/pair/baseline"])
+
+
+@pytest.mark.parametrize(("kept", "sentence"), [
+    (slice(0, 31), r"/force_1 has forces from 0 to 0.3 s after the first reading, and /force_0 from 0 to 0.5 s"),
+    (slice(20, 51), r"/force_1 has forces from 0.2 to 0.5 s after the first reading, and /force_0 from 0 to 0.5 s"),
+    (slice(3, 49), None)])
+def test_forces_of_the_second_finger_that_end_early_or_begin_late_are_not_held(tmp_path, kept, sentence):
+    """Rows are 0.01 s apart; 0.05 s are allowed, as of the first finger."""
+    stamps = [10**9 + 10**7 * k for k in range(51)]
+    taxels = [("/t", "std_msgs/msg/Int32MultiArray", stamp, array([k] * 56)) for k, stamp in enumerate(stamps)]
+    forces = [(topic, "std_msgs/msg/Float64", stamp, lambda types: types["std_msgs/msg/Float64"](data=1.0))
+              for topic, rows in (("/force_0", slice(None)), ("/force_1", kept)) for stamp in stamps[rows]]
+    path = bag_of(tmp_path / "f.mcap", taxels + forces)
+    recording = read_bag(path, baseline="subtracted")
+    if sentence is None:
+        assert (with_force_of_bag(recording, path).force_n.values == 1).all()
+        return
+    with pytest.raises(InputError, match=sentence):
+        with_force_of_bag(recording, path)
 
 
 @pytest.mark.parametrize(("change", "sentence"), [

@@ -19,7 +19,7 @@ from softtact.errors import InputError
 from softtact.files import atomic_path
 from softtact.inputs import check_input, in_one_sentence
 from softtact.outputs import not_written, temporary_folder
-from softtact.readout.recording import COLUMNS, LARGEST_RAW, ROWS, TAXELS, make_recording, running_forward, with_forces_at
+from softtact.readout.recording import COLUMNS, LARGEST_RAW, LATE_S, ROWS, TAXELS, make_recording, running_forward, with_forces_at
 
 if TYPE_CHECKING:
     import xarray
@@ -48,7 +48,7 @@ def read_bag(path: str | Path, *, baseline: str = "auto", topics: Sequence[str] 
     path = Path(path)
     with _opened(path) as bag:
         series = bag.only(_taxels, topics, "taxels (messages with 28 or 56 numbers)")
-        rest = None if baseline == "subtracted" else bag.baseline_of(series.topic, topics)
+        rest = None if baseline == "subtracted" else bag.baseline_of(series, topics)
     stamps, repairs = running_forward(path, series.time_s(), range(len(series.values)), unit="s")
     values, fingers = np.array(series.values), len(series.values[0]) // TAXELS
     base, words = _baseline(values, rest, baseline)
@@ -67,6 +67,7 @@ def with_force_of_bag(recording: "xarray.Dataset", path: str | Path, *, topics: 
     receive = recording.attrs.get("stamps") == RECEIVED
     start = recording.attrs.get("start_s", 1e-3 * recording.attrs["start_ms"])
     stamps, repairs = running_forward(path, found[0].time_s(receive=receive), range(len(found[0].values)), unit="s")
+    _refuse_short(path, found, start + recording.time.values, receive)
     force = np.stack([np.interp(stamps, one.time_s(receive=receive), one.values) for one in found], axis=1)
     force = force if force.shape[1] == recording.sizes["finger"] else np.repeat(force[:, :1], recording.sizes["finger"], axis=1)
     names = " and ".join(one.topic for one in found)
@@ -178,9 +179,18 @@ class _Bag:
                              "topic.")
         return chosen[0]
 
-    def baseline_of(self, topic, topics):
-        """The series of a topic's baseline: named in `topics`, or of its namespace, or the only one; None without one."""
+    def baseline_of(self, series, topics):
+        """The series of the baseline of taxels: named in `topics`, or of their namespace, or the only one; None without one.
+
+        Raises InputError where several fit, and where the named one has another number of taxels.
+        """
+        topic, count = series.topic, np.size(series.values[0])
         found = [one for one in self.all(_taxels, ()) if one.topic.endswith("baseline")]
+        sizes = {one.topic: np.size(one.values[0]) for one in found}
+        for name in topics:
+            if name.endswith("baseline") and sizes.get(name) != count:
+                raise InputError(f"{self.path}: the baseline {name} has {sizes.get(name, 'other')} numbers and {topic} has "
+                                 f"{count}; name the baseline of the same sensor (--topic).")
         beside = [one for one in found if one.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
         chosen = {one.topic: one for one in reversed([one for one in found if one.topic in topics] or beside or found)}
         if len(chosen) > 1:
@@ -252,6 +262,18 @@ def _force(message):
         return float(force.z)
     data = getattr(message, "data", None)
     return float(data) if isinstance(data, float) else None
+
+
+def _refuse_short(path, forces, at_s, receive):
+    """Refuse a second finger's forces that begin after the first one's, or end before, within times (n,) of readings in s."""
+    if len(forces) < 2:
+        return
+    first, second = (one.time_s(receive=receive) for one in forces)
+    begin, end = max(first[0], at_s[0]), min(first[-1], at_s[-1])
+    if second[0] > begin + LATE_S or second[-1] < end - LATE_S:
+        (a, b), (c, d) = (second[[0, -1]] - at_s[0], np.array([begin, end]) - at_s[0])
+        raise InputError(f"{path}: {forces[1].topic} has forces from {a:.4g} to {b:.4g} s after the first reading, and "
+                         f"{forces[0].topic} from {c:.4g} to {d:.4g} s; record both over the whole press, or name one (--topic).")
 
 
 def _baseline(values, rest, form):

@@ -32,7 +32,7 @@ MOVES = 30.0                        # counts: least change of a pressed finger; 
 _SLOW, _DEAF = 15, 0.02             # readings of a mean; its change over that of two taxels beside it, less than a press spreads
 _AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], dtype=bool)
 NOISY = 1.0                         # counts: noise that is no rounding, so that a taxel, or a frame, does not stand by chance
-_LATE_S = 0.05                      # by which a log of forces may begin late or end early: a few rows of the log
+LATE_S = 0.05                       # by which a log of forces may begin late or end early: a few rows of the log
 _GAP, _GAP_S = 6.0, 0.1             # a gap in a log: times the usual distance of its rows, and s
 _SLOWEST_S = 0.5                    # distance of rows from which on a log may be one in ms
 _WRAPS_MS = (2.0**32, 2.0**31, 2.0**24, 2.0**16, 2.0**32 / 1000)     # where counters of ms, the last of us, start anew
@@ -164,7 +164,7 @@ def with_forces_at(recording: "xarray.Dataset", time_s: np.ndarray, force_n: np.
     """
     at = recording.time.values
     _refuse_other_unit(log, time_s, at)
-    if not (len(time_s) and time_s[0] <= at[0] + _LATE_S and time_s[-1] >= at[-1] - _LATE_S):
+    if not (len(time_s) and time_s[0] <= at[0] + LATE_S and time_s[-1] >= at[-1] - LATE_S):
         raise InputError(f"{log}: its times {_span(time_s)} do not cover those of {name_of(recording)}, {_span(at)}; give forces "
                          "from before its first reading until after its last.")
     force = np.stack([np.interp(at, time_s, one) for one in force_n.T], axis=1)
