@@ -77,6 +77,20 @@ def test_volume_strained_beyond_the_elastomers_tests_is_flagged(skin, monkeypatc
     assert pressed.extrapolated_volume_fraction[0] == 0.2
 
 
+def test_a_press_at_finite_strains_is_not_flagged_for_a_secant_modulus_that_it_does_not_use(skin, monkeypatch):
+    from softtact.skin import contact
+
+    small = contact.contact_load
+
+    def finite(body, *args, **given):
+        load = small(body, *args, **given)
+        return replace(load, pressure_mpa=1e-4, displacement_mm=body.layer.displacement(load, young_mpa=0.2))
+
+    monkeypatch.setattr(contact, "press_at_finite_strains", finite)
+    pressed = skin.press(BALL, force_n=0.2, model="solid", label="")
+    assert pressed.within_validity[0] and pressed.validity_reason[0] == ""
+
+
 def test_a_contact_of_few_points_is_flagged(skin):
     mesh = skin.prepared_models["elastic"].layer.mesh
     x, y, _ = min(mesh.nodes_mm[mesh.top], key=lambda node: np.hypot(*(node[:2] - TAXEL)))

@@ -115,6 +115,11 @@ def test_the_tiny_design_computes_every_section(tmp_path, capsys):
         ({"converter": {"name": "papr"}}, "there is no converter 'papr'; did you mean 'paper'?"),
         ({"module": {"pitch": 5}}, "at 'module': there is no key 'pitch'; did you mean 'pitch_mm'?"),
         ({"module": {"pitch_mm": 4.2}}, "mm apart and need more than 4.4 mm"),
+        ({"module": {"pitch_mm": 5, "centres_mm": [[15, 9]]}}, "at 'module.pitch_mm': it has no effect beside centres_mm"),
+        ({"module": {"centres_mm": [[15, 9]]}, "loads": [SMALL["loads"][0] | {"at_taxel": 1}], "search": {}},
+         "at 'search': it builds the published module at other pitches, and module.centres_mm has places of its own"),
+        ({"maps": {"finger_mm2": 260}}, "at 'maps.finger_mm2': at none of the places 1 mm apart does a finger of 260 mm2 lie on"),
+        ({"maps": {"pitches_mm": [5, 4.4]}}, "at 'maps.pitches_mm': taxels at a pitch of 4.4 mm need more than 4.4 mm"),
         ({"module": {"guard_radius_mm": {"value": 2.2, "assumed": True}}}, "an assumed value needs a reason"),
         (
             {"loads": [{"name": "m", "mask": "no.png", "pixel_mm": 0.1, "at_mm": [15, 9], "pressure_kpa": 10}]},

@@ -14,11 +14,12 @@ from softtact.errors import InputError
 from softtact.files import read_dataset, read_json
 from softtact.skin.analysis import CONVERTERS, LayerMeshSizes, Skin, analyse
 from softtact.skin.contact import compression_law, contact_load, press_at_finite_strains, solid_layer
-from softtact.skin.design import LoadChoice
+from softtact.skin.design import LoadChoice, SkinDesign
 from softtact.skin.elastomers import Elastomer, read_elastomers
 from softtact.skin.layout import module_layout
 from softtact.skin.loads import Load
 from softtact.studies.skin.stages.readings import press_object, read_taxels
+from softtact.studies.skin.stages.summary import _facts
 
 
 def linear(poisson, *, young_mpa=0.2):
@@ -87,6 +88,31 @@ def test_finite_strains_are_for_objects_and_friction_is_for_finite_strains():
             LoadChoice(name="one", at_taxel=1, **keys)
 
 
+@pytest.mark.parametrize("pressure_mpa", [1e-4, 1.0])
+def test_a_load_at_finite_strains_has_no_secant_modulus_whatever_its_pressure(pressure_mpa):
+    """Below the tests the modulus is held, with a remark; beyond twice their largest stress it is refused."""
+    skin = small_skin()
+    load = Load(np.array([[10.0, 5.0]]), np.ones(1), pressure_mpa, "1 N", np.zeros_like(skin.layer.mesh.nodes_mm))
+    readings = analyse(skin, [load], elastomer=read_elastomers()["SomaFoama"], converter=CONVERTERS["paper"])
+    assert readings.remarks == [] and np.isnan(readings.young_mpa).all()
+    assert readings.delta_ff == pytest.approx(0.0, abs=1e-6)
+
+
+def finite_and_small(strains):
+    """A design with a load for each of the strains, in the words of the report."""
+    loads = [{"name": f"load {number}", "mesh": "ball.stl", "at_taxel": 1, "force_n": 1.0, "strains": one}
+             for number, one in enumerate(strains)]
+    return _facts(SkinDesign.model_validate({"skin": "s", "module": {"centres_mm": [[15, 9]]}, "loads": loads}))
+
+
+def test_the_report_says_which_strains_are_finite_and_that_taxels_have_places_of_their_own():
+    small, both, finite = (finite_and_small(strains) for strains in (["small"], ["small", "finite"], ["finite", "finite"]))
+    assert "at places of their own" in small and "pitch" not in small
+    assert "Small strains" in small and "finite" not in small
+    assert "Small strains" in both and "of load 1 finite strains, with the law of a foam" in both
+    assert "Small strains" not in finite and "Finite strains, with the law of a foam" in finite
+
+
 def test_the_stages_of_a_study_say_where_the_law_is_extrapolated(monkeypatch, tmp_path):
     """The press is made up: a study presses in one job, and reads what that kept in another one."""
     def pressed(skin, *_, **__):
@@ -102,7 +128,9 @@ def test_the_stages_of_a_study_say_where_the_law_is_extrapolated(monkeypatch, tm
     made = {name: tmp_path / file for name, file in (("readings", "readings.nc"), ("table", "loads.csv"), ("facts", "loads.json"))}
     read_taxels(inputs={"pressed": [tmp_path / "load.nc"]}, outputs=made,
                 settings=settings | {"loads": [load], "converter": dataclasses.asdict(CONVERTERS["paper"])})
-    assert "1 N by a ball: the law of the elastomer is extrapolated there." in read_json(made["facts"])["remarks"]
+    facts = read_json(made["facts"])
+    assert "1 N by a ball: the law of the elastomer is extrapolated there." in facts["remarks"]
+    assert facts["loads"][0]["young_mpa"] is None      # NaN is no JSON
     assert read_dataset(tmp_path / "load.nc").attrs["indentation_mm"] == 0.3
 
 

@@ -1,8 +1,10 @@
 """What a skin meets: objects in contact, links that it is laid on, places of fingers, other programs."""
 
+import dataclasses
 from xml.etree import ElementTree as xml
 
 import numpy as np
+import pandas as pd
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
@@ -83,6 +85,39 @@ def test_a_finger_is_felt_best_over_a_taxel_and_two_taxels_cannot_tell_place_and
     over, between, far = (maps.smallest_force_n[k] for k in at.values())
     assert over < between < far and far > 20 * over
     assert np.isinf(maps.localisation_mm).all()
+
+
+def of_noise(counts):
+    """Maps of three taxels, which give place and force, with a converter's noise."""
+    converter = dataclasses.replace(CONVERTERS["paper"], noise_counts=counts)
+    skin = small_skin(centres=((8.0, 4.0), (13.0, 4.0), (10.5, 9.0)))
+    return patch_maps(skin, finger_mm2=7.0, pressure_mpa=0.02, young_mpa=0.1, converter=converter, detected_counts=3.0,
+                      spacing_mm=2.0)
+
+
+def test_the_error_of_localisation_is_in_proportion_to_the_noise_and_none_without_noise():
+    none, one, two = (of_noise(counts).localisation_mm for counts in (0.0, 1.0, 2.0))
+    given = np.isfinite(one)
+    assert given.any() and (none[given] == 0).all() and np.isinf(none[~given]).all()
+    np.testing.assert_allclose(two, 2 * one, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("places", "half_way_mm"), [(1, 0.2), (4, 0.2), (4, 0.0)])
+def test_maps_of_taxels_that_do_not_tell_a_place_are_drawn_and_it_is_said(places, half_way_mm, tmp_path, monkeypatch):
+    from softtact.studies.skin.stages import figures
+
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, *_: drawn.append(figure) or figure.canvas.draw())
+    x, y = np.array([[12.0, 14.0, 12.0, 14.0], [6.0, 6.0, 8.0, 8.0]])[:, :places]
+    pd.DataFrame({"x_mm": x, "y_mm": y, "smallest_force_n": 0.1, "localisation_mm": np.inf}).to_csv(tmp_path / "d.csv")
+    pd.DataFrame({"pitch_mm": [5.0, 6.0], "crosstalk": 0.1, "localisation_mm": half_way_mm}).to_csv(tmp_path / "c.csv")
+    figures.draw_maps(inputs={"detection": tmp_path / "d.csv", "crosstalk": tmp_path / "c.csv"}, outputs={},
+                      settings={"module": {"centres_mm": [[15.0, 9.0]]}, "patch": "none", "force_n": 0.5})
+    titles = [axes.get_title() for axes in drawn[0].axes]
+    assert [title for title in titles if title] == ["error of localisation at 0.5 N (mm): not given by these taxels"]
+    (marks,) = drawn[0].axes[0].collections
+    assert np.isfinite(marks.get_sizes()).all()
 
 
 def test_exports_hold_the_places_and_normals_in_metres():

@@ -55,6 +55,16 @@ def test_a_value_of_a_palpation_sensor_s_design_changes_just_the_stages_that_use
     assert changed("probe", **changes) == stages
 
 
+def test_the_papers_claims_on_skin_are_judged_with_the_papers_elastomers(tmp_path):
+    file = tmp_path / "mine.yaml"
+    foam = {"name": "SomaFoama", "strain_percent": [0.0, 500.0, 0.0, 0.0], "density_g_cm3": 1.0, "poisson": 0.3,
+            "permittivity": 2.0, "permittivity_fe": 2.0}
+    file.write_text(yaml.safe_dump({"elastomers": [foam]}))
+    papers, mine = ({job.stage: job.settings for job in jobs_of("skin", **changes).values()} for changes in (
+        {}, {"elastomers": str(file)}))
+    assert mine["choose_layer"] != papers["choose_layer"] and mine["judge_claims"] == papers["judge_claims"]
+
+
 def test_other_loads_leave_the_sweeps_of_the_displacement_as_they_are():
     before, after = jobs_of("probe"), jobs_of("probe", load_n={"to": 4})
     assert {path for path in before if before[path] != after[path]} - {"out/report.html"} == {

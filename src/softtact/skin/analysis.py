@@ -125,7 +125,7 @@ class Readings:
     layer_mm: np.ndarray
     """(load, node, 3): displacement of all nodes."""
     young_mpa: np.ndarray
-    """(load,): the secant modulus that each load was solved with."""
+    """(load,): the secant modulus that each load was solved with; nan at finite strains, which have a law."""
     remarks: list[str]
     """Where a curve was extrapolated, or a strain is large."""
 
@@ -245,15 +245,15 @@ class CoarseSkin(Skin):
 
 
 def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converter: Converter) -> Readings:
-    """`Readings` of loads one by one, each solved with the elastomer's secant modulus at its pressure."""
+    """`Readings` of loads one by one, each with the displacement it brings or the elastomer's secant modulus at its pressure."""
     rows, moved, moduli, remarks = [], [], [], []
     for load in loads:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", ExtrapolationWarning)
-            young = elastomer.young_mpa(load.pressure_mpa)
-        remarks += [str(warning.message) for warning in caught]
-        displacement = load.displacement_mm
+        displacement, young = load.displacement_mm, np.nan
         if displacement is None:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always", ExtrapolationWarning)
+                young = elastomer.young_mpa(load.pressure_mpa)
+            remarks += [str(warning.message) for warning in caught]
             displacement = skin.layer.displacement(load, young_mpa=young)
         rows.append(skin.capacitance_ff(displacement))
         moved.append(displacement)

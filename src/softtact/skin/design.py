@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from softtact.errors import ExtrapolationWarning, InputError
@@ -18,6 +19,7 @@ from softtact.skin.choice import Needs
 from softtact.skin.elastomers import Elastomer, find_elastomer, fingertip_area_mm2, read_elastomers
 from softtact.skin.layout import Layout, hexagon_layout, module_layout
 from softtact.skin.loads import Load, disc, ellipse, mask, refuse_beside
+from softtact.skin.maps import finger_places
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
@@ -240,6 +242,9 @@ def check_design(values: Mapping[str, Any], path: str | Path) -> SkinDesign:
         design = SkinDesign.model_validate(values)
     except ValidationError as error:
         raise InputError(f"{path}{_fault(first_fault(error))}") from None
+    if design.module.centres_mm is not None and "pitch_mm" in design.module.model_fields_set:
+        raise InputError(f"{path}, at 'module.pitch_mm': it has no effect beside centres_mm, which has the taxels' places; leave "
+                         "one of both out.")
     names = [load.name for load in design.loads]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -350,6 +355,8 @@ def _refuse_places(design, layout, folder, where):
             read_mesh(folder / load.mesh, unit=load.unit)
     if design.link:
         read_mesh(folder / design.link.mesh, unit=design.link.unit)
+    if design.maps:
+        _refuse_maps(design, layout, where)
     if design.probes is None:
         return
     if design.probes.at_taxel > len(layout.centres_mm):
@@ -361,10 +368,24 @@ def _refuse_places(design, layout, folder, where):
         refuse_beside(load, layout, where=f"{where}, at 'probes.diameters_mm', {diameter:g} mm")
 
 
+def _refuse_maps(design, layout, where):
+    """Refuse a finger that lies nowhere on the elastomer as a whole, and pitches at which taxels overlap."""
+    maps, least = design.maps, 2 * design.module.guard_radius_mm
+    if not len(finger_places(layout, finger_mm2=maps.finger_mm2, spacing_mm=maps.spacing_mm)):
+        raise InputError(f"{where}, at 'maps.finger_mm2': at none of the places {maps.spacing_mm:g} mm apart does a finger of "
+                         f"{maps.finger_mm2:g} mm2 lie on the elastomer as a whole; make finger_mm2 or spacing_mm smaller.")
+    if (narrow := min(maps.pitches_mm, default=np.inf)) <= least:
+        raise InputError(f"{where}, at 'maps.pitches_mm': taxels at a pitch of {narrow:g} mm need more than {least:g} mm (guard "
+                         "gaps included); make it larger, or the module's guard_radius_mm smaller.")
+
+
 def _refuse_search(design, elastomers, where):
     """Refuse unknown elastomers, those that do not bear the range of pressure, and modules without place for their taxels."""
     if design.search is None:
         return
+    if design.module.centres_mm is not None:
+        raise InputError(f"{where}, at 'search': it builds the published module at other pitches, and module.centres_mm has places "
+                         "of its own, which have no pitch; leave one of both out.")
     highest = 1e-3 * (design.choice or Choice()).range_kpa[1]
     for name in design.search.elastomers or ():
         elastomer = find_elastomer(name, elastomers, where=f"{where}, at 'search.elastomers'")

@@ -47,11 +47,7 @@ def patch_maps(skin: Skin, *, finger_mm2: float, pressure_mpa: float, young_mpa:
 
     Places lie `spacing_mm` apart, with the whole finger on the elastomer.
     """
-    radius = np.sqrt(finger_mm2 / np.pi)
-    low, high = skin.layout.outline_mm.min(axis=0), skin.layout.outline_mm.max(axis=0)
-    lines = (np.arange(a, b, spacing_mm) for a, b in zip(low, high, strict=True))
-    grid = np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, 2)
-    places = grid[skin.layout.inside(grid, margin_mm=radius + _STEP_MM)]
+    places = finger_places(skin.layout, finger_mm2=finger_mm2, spacing_mm=spacing_mm)
     force = pressure_mpa * finger_mm2
     gains = {shift: _gain(skin, places + _STEP_MM * np.array(shift), finger_mm2) / young_mpa
              for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))}
@@ -62,6 +58,14 @@ def patch_maps(skin: Skin, *, finger_mm2: float, pressure_mpa: float, young_mpa:
     return PatchMaps(places, gain, detected_counts * converter.step_ff / np.maximum(gain.max(axis=1), 1e-12),
                      _standard_error(np.stack([*slopes, gain], axis=2), converter.noise_ff),
                      np.linalg.norm(centroid - places, axis=1), force)
+
+
+def finger_places(layout: Layout, *, finger_mm2: float, spacing_mm: float) -> np.ndarray:
+    """Places (place, 2) in mm, `spacing_mm` apart, where a round finger of an area lies on the elastomer as a whole."""
+    low, high = layout.outline_mm.min(axis=0), layout.outline_mm.max(axis=0)
+    lines = (np.arange(a, b, spacing_mm) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, 2)
+    return grid[layout.inside(grid, margin_mm=np.sqrt(finger_mm2 / np.pi) + _STEP_MM)]
 
 
 @dataclass(frozen=True)
@@ -128,12 +132,15 @@ def _gain(skin, places, area_mm2):
 
 
 def _standard_error(slopes, noise):
-    """Standard error of the place (n,), from the slopes (n, taxel, 3) of the readings by x, y and force, all three unknown."""
-    information = np.einsum("nti,ntj->nij", slopes, slopes) / max(noise, 1e-300) ** 2
+    """Standard error of the place (n,), from the slopes (n, taxel, 3) of the readings by x, y and force, all three unknown.
+
+    noise: of a reading, 0 or more; where readings do not give the place the error is infinite, without noise, too
+    """
+    information = np.einsum("nti,ntj->nij", slopes, slopes)     # for a noise of 1, by which the error is in proportion to it
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", information), 1e-300))
     scaled = information / (scale[:, :, None] * scale[:, None, :])
     error = np.full(len(slopes), np.inf)
     regular = np.linalg.eigvalsh(scaled)[:, 0] > _SINGULAR
     variance = np.einsum("nii->ni", np.linalg.inv(scaled[regular])) / scale[regular] ** 2
-    error[regular] = np.sqrt(variance[:, :2].sum(axis=1))
+    error[regular] = noise * np.sqrt(variance[:, :2].sum(axis=1))
     return error

@@ -16,6 +16,7 @@ from typing import Any
 
 from softtact.errors import InputError
 from softtact.skin.design import Choice, PreparedDesign, SkinDesign, bears, check_design, needs_of, prepare, reaches
+from softtact.skin.elastomers import read_elastomers
 from softtact.studies.jobs import Job, figure_files, files_made, from_here
 
 _TABLES = {
@@ -67,8 +68,8 @@ def jobs(study: SkinStudy, folder: str | Path) -> list[Job]:
     made.append(Job("write_exports", {"laid": f"{folder}/modules.nc"} if design.link else {},
                     {kind: f"{folder}/exports/skin.{kind}" for kind in ("txt", "urdf", "xml")}, _plain(design, "module", "patch")))
     if design.claims:
-        claims = {"elastomers": _elastomers(study)}
-        made.append(Job("judge_claims", {}, _tables("judge_claims", folder), claims, work={"claims": 1}))
+        papers = {"elastomers": _values(read_elastomers())}     # a user's may take the name of one that the papers measured
+        made.append(Job("judge_claims", {}, _tables("judge_claims", folder), papers, work={"claims": 1}))
     return [*made, _report(study, folder, made)]
 
 
@@ -174,7 +175,12 @@ def _plain(design, *names):
 
 
 def _elastomers(study):
-    return [elastomer.model_dump(mode="json") for elastomer in study.prepared.elastomers.values()]
+    return _values(study.prepared.elastomers)
+
+
+def _values(elastomers):
+    """The fields of each elastomer of a mapping by name."""
+    return [elastomer.model_dump(mode="json") for elastomer in elastomers.values()]
 
 
 def _converter(study):

@@ -139,17 +139,23 @@ def draw_maps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
         (one, 1e3 * maps.smallest_force_n.to_numpy(), "smallest detectable force (mN)"),
         (two, maps.localisation_mm.to_numpy(), f"error of localisation at {settings['force_n']:.2g} N (mm)"),
     ):
-        low, high = np.nanpercentile(values[np.isfinite(values)], (0, 97))
-        shown = axes.scatter(
-            *places.T, c=values, cmap="viridis", vmin=low, vmax=max(high, low * 1.01), marker="s", s=_size(places)
-        )
-        figure.colorbar(shown, ax=axes, label=label, extend="max")
-        _outline_taxels(axes, layout)
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            low, high = np.percentile(finite, (0, 97))
+            shown = axes.scatter(
+                *places.T, c=values, cmap="viridis", vmin=low, vmax=max(high, low * 1.01), marker="s", s=_size(places)
+            )
+            figure.colorbar(shown, ax=axes, label=label, extend="max")
+        else:     # one or two taxels do not tell a place and a force
+            axes.set_title(f"{label}: not given by these taxels", fontsize=9)
+        _outline_taxels(axes, layout, edge="white" if len(finite) else "0.4")
         _frame(axes, layout)
     three.semilogy(crosstalk.pitch_mm, np.maximum(np.abs(crosstalk.crosstalk), 1e-6), "o-", color="#1f4e79")
     three.set(xlabel="pitch (mm)", ylabel="crosstalk: neighbour over own, absolute")
     beside = three.twinx()
-    beside.semilogy(crosstalk.pitch_mm, crosstalk.localisation_mm, "s--", color="#e08214")
+    beside.plot(crosstalk.pitch_mm, crosstalk.localisation_mm, "s--", color="#e08214")
+    if (crosstalk.localisation_mm > 0).any():     # 0 of a converter without noise
+        beside.set_yscale("log")
     beside.set_ylabel("error of localisation half-way (mm)", color="#e08214")
     save(figure, *outputs.values())
 
@@ -193,11 +199,11 @@ def _taxels(axes, layout, values, *, cmap, limits):
     return discs
 
 
-def _outline_taxels(axes, layout):
+def _outline_taxels(axes, layout, *, edge):
     from matplotlib.patches import Circle
 
     for centre in layout.centres_mm:
-        axes.add_patch(Circle(tuple(centre), layout.radius_mm, fill=False, edgecolor="white", linewidth=0.7))
+        axes.add_patch(Circle(tuple(centre), layout.radius_mm, fill=False, edgecolor=edge, linewidth=0.7))
 
 
 def _frame(axes, layout):
@@ -208,6 +214,7 @@ def _frame(axes, layout):
 
 
 def _size(places):
-    """Area of a mark in points such that neighbouring marks touch."""
-    spacing = float(np.min(np.diff(np.unique(np.round(places[:, 0], 6))), initial=np.inf)) if len(places) > 1 else 1.0
-    return 0.9 * (230 / np.ptp(places, axis=0).max() * spacing) ** 2
+    """Area of a mark in points such that neighbouring marks touch, of one place or of places on a line, too."""
+    steps = [np.diff(np.unique(np.round(along, 6))) for along in places.T]
+    spacing = min((float(one.min()) for one in steps if len(one)), default=1.0)
+    return 0.9 * (230 / max(np.ptp(places, axis=0).max(), spacing) * spacing) ** 2

@@ -55,7 +55,7 @@ def read_taxels(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
     write_dataset(outputs["readings"], _dataset(skin, loads, readings, elastomer), seed=None, settings=settings)
     write_csv(outputs["table"], table)
     write_json(outputs["facts"], {"taxels": len(skin.layout.centres_mm), "remarks": readings.remarks,
-                                  "loads": table.to_dict("records")})
+                                  "loads": table.astype(object).where(table.notna(), None).to_dict("records")})
 
 
 def compute_probes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

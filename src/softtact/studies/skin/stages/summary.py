@@ -93,10 +93,21 @@ def _facts(design: SkinDesign) -> str:
     """The skin and its model in sentences."""
     module = design.module
     patch = "Six modules around a corner, under one piece of elastomer" if design.patch == "hexagon" else "One module"
-    return (f"{patch}: side {module.side_mm:g} mm, taxels of radius {module.radius_mm:g} mm at a pitch of {module.pitch_mm:g} mm, "
+    places = f"at a pitch of {module.pitch_mm:g} mm" if module.centres_mm is None else "at places of their own"
+    return (f"{patch}: side {module.side_mm:g} mm, taxels of radius {module.radius_mm:g} mm {places}, "
             f"{module.thickness_mm:g} mm of {design.elastomer}, converter {design.converter.name!r} with a stray of "
-            f"{design.converter.stray_pf:g} pF (assumed). Small strains, with the secant modulus at the pressure as in the papers; "
-            "floor bonded, sides free; Laplace's equation on the deformed mesh.")
+            f"{design.converter.stray_pf:g} pF (assumed). {_strains(design)}; floor bonded, sides free; Laplace's equation on the "
+            "deformed mesh.")
+
+
+def _strains(design: SkinDesign) -> str:
+    """How the loads are solved, in words."""
+    finite = [load.name for load in design.loads if load.strains == "finite"]
+    small = "Small strains, with the secant modulus at the pressure as in the papers"
+    by_law = "finite strains, with the law of a foam that is fitted to the elastomer's curve"
+    if not finite:
+        return small
+    return by_law.capitalize() if len(finite) == len(design.loads) else f"{small}; of {', '.join(finite)} {by_law}"
 
 
 def _on_claims(files):
