@@ -404,6 +404,13 @@ def test_a_press_file_tells_what_was_pressed_how_and_by_which_command(tmp_path, 
     assert facts["unit"] == "mm" and facts["pose"] == "centred, touching" and facts["command"].startswith("softtact ")
 
 
+def test_the_command_in_a_press_file_can_be_run_again(tmp_path):
+    arguments = ["press", str(OBJECT), "--unit", "mm", "--motion", "z -0.2; x 0.1", "--model", "elastic", "--sensor", "pad4x4",
+                 "--out", str(tmp_path / "a press.nc")]
+    assert main(arguments) == 0
+    assert shlex.split(read_press(tmp_path / "a press.nc").attributes["command"]) == ["softtact", *arguments]
+
+
 def test_a_time_limit_ends_a_press_with_status_3_and_one_sentence(tmp_path, capsys):
     ball = tmp_path / "ball.stl"
     trimesh.creation.icosphere(subdivisions=3, radius=6.0).export(ball)

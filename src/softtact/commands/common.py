@@ -4,6 +4,7 @@ import argparse
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -134,7 +135,7 @@ def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
 
     return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
             "unit": options.unit or "that of the file", "pose": options.pose or "centred, touching",
-            "command": " ".join(["softtact", *options.given])}
+            "command": shlex.join(["softtact", *options.given])}
 
 
 def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:

@@ -187,8 +187,9 @@ def _refuse_idle(options, spec):
                              "leave it out, or choose another model.")
     if options.policy == "paper" and options.tolerance != _DEFAULTS["tolerance"]:
         raise InputError(f"--tolerance {options.tolerance:g}: it has no effect on the policy paper; leave one of the two out.")
-    if options.full_scale and not (options.plot and spec.has_layers):
-        raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out." if spec.has_layers
+    has_taxels = spec.has_layers and "taxels" in spec.stated_readouts
+    if options.full_scale and not (options.plot and has_taxels):
+        raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out." if has_taxels
                          else "--full-scale: it has no effect on a sensor without taxels; leave it out.")
 
 
@@ -208,7 +209,7 @@ def _check_soft(options, spec):
         raise InputError(f"--object-law {options.object_law}: give --object-size MM, the length of the object's elements.")
     if options.model not in ("auto", "solid"):
         raise InputError(f"--model {options.model}: a soft object is pressed only with the solid model; leave it out.")
-    for name in ("mesh_quality", "policy", *(["device"] if spec.has_layers else [])):
+    for name in ("mesh_quality", "policy", "tolerance", *(["device"] if spec.has_layers else [])):
         if getattr(options, name) != _DEFAULTS[name]:
             raise InputError(f"{_given(options, name)}: it has no effect on a soft object; leave it out.")
 
@@ -233,6 +234,10 @@ def _how(options, spec):
             if not motion.forces_n and getattr(options, name) != _DEFAULTS[name]:
                 raise InputError(f"--{name} {getattr(options, name)}: it has no effect on a motion other than straight down by "
                                  "forces, for which auto is the hyperelastic model; leave it out.")
+        if (options.mesh_quality != _DEFAULTS["mesh_quality"] and options.model == "auto" and spec.has_layers
+                and (spec.edge.far or motion.turns or motion.loaded_aside)):
+            raise InputError(f"{_given(options, 'mesh_quality')}: it has no effect on this motion, for which auto is not the "
+                             "hyperelastic model; leave it out.")
         return {"motion": motion}
     forces = sorted(set(options.force))
     if forces != options.force:
