@@ -1,6 +1,7 @@
 """Robot skins on the page: coarse while the object moves, whole after the long model, taxels coloured by their counts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from softtact.errors import InputError
 from softtact.geometry.pose import Pose
 from softtact.play import pictures
+from softtact.play.bench import force_span_n
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +35,23 @@ def test_a_long_model_makes_the_press_whole(on_skin, whole):
     there = replace(state, x_mm=0.1)
     solver.bench(state.sensor).take(solver.solve(there).press, whole)
     assert solver.solve(there).stage == "whole" and solver.solve(there).result is whole
+
+
+def test_the_command_of_a_whole_press_names_the_model_that_made_it(on_skin, whole):
+    state, solver = on_skin
+    there = replace(state, x_mm=0.2)
+    first = solver.solve(there)
+    assert "--model elastic" in first.press.command
+    solver.bench(state.sensor).take(replace(first.press, model="solid"), replace(whole, model="solid"))
+    assert "--model solid" in solver.solve(there).press.command
+
+
+def test_the_force_that_the_page_begins_with_is_within_the_forces_that_it_offers(on_skin, solver, state):
+    skin = on_skin[1].bench(on_skin[0].sensor)
+    small = SimpleNamespace(first_force_n=0.08, force_range_n=[0, 2])
+    for bench in (skin, small, solver.bench(state.sensor)):
+        least, most = force_span_n(bench)
+        assert 0 < least <= bench.first_force_n <= most == bench.force_range_n[1]
 
 
 def test_a_skin_is_pressed_to_a_depth_by_the_force_that_it_needs(on_skin):

@@ -34,8 +34,12 @@ def test_surface_and_tiles_lie_where_they_are_pressed(corner):
     assert bright[1] > 0 and bright[0] > tiles.vertices[:, 0].mean() and len(tiles.faces) == 2 * 28
 
 
-def test_a_comparison_is_wider_by_its_difference(corner):
-    assert comparison(corner.result, corner.result).shape[1] > board(corner.result).shape[1]
+def test_a_comparison_is_wider_by_its_difference_which_has_the_middle_colour_where_there_is_none(corner):
+    alone, equal = board(corner.result), replace(corner.result)
+    np.testing.assert_array_equal(comparison(corner.result, corner.result), alone)
+    beside = comparison(corner.result, equal)
+    middle = beside[200, (alone.shape[1] + beside.shape[1]) // 2].astype(int)
+    assert beside.shape[1] > alone.shape[1] and np.abs(middle - pictures.colours("coolwarm")[128]).max() <= 2
 
 
 def test_a_mesh_of_very_many_facets_is_shown_with_fewer_of_the_same_size(monkeypatch):

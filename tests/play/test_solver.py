@@ -88,6 +88,10 @@ def test_a_depth_is_reached(state, solver, depth):
 def test_a_depth_beyond_the_largest_force_ends_at_that_force(state, solver):
     shown = solver.solve(replace(state, load_by="depth", depth_mm=9.0), draft=True)
     assert shown.result.normal_force_n[-1] == pytest.approx(50.0)
+    assert "50 N, the sensor's largest force, is too little for the depth of 9 mm" in shown.result.validity_reason[-1]
+    assert not shown.result.within_validity[-1]
+    reached = solver.solve(replace(state, load_by="depth", depth_mm=0.2), draft=True).result
+    assert "largest force" not in reached.validity_reason[-1]
 
 
 def test_an_object_that_only_moved_keeps_its_underside_and_has_the_map_of_a_new_one(state):

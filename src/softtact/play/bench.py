@@ -9,6 +9,7 @@ from softtact.geometry.repair import Mended
 from softtact.play.state import Press, State
 from softtact.press.result import PressResult
 
+LEAST_FORCE_N = 0.1     # of the page, where the sensor does not begin with less
 _KEPT = 50     # results of long models, the latest
 
 
@@ -101,3 +102,8 @@ class Bench(Protocol):
 
     def follows(self, model: str) -> bool:
         """Whether a long model follows slide and twist."""
+
+
+def force_span_n(bench: Bench) -> tuple[float, float]:
+    """Least and largest force in N that the page offers; the force that it begins with lies between them."""
+    return min(LEAST_FORCE_N, float(bench.first_force_n)), float(bench.force_range_n[1])

@@ -23,9 +23,10 @@ from softtact.press.fast import first_touch_mm, force_at_depth, press_underside
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor
 from softtact.press.task import checked_forces
-from softtact.press.validity import flag_buried
+from softtact.press.validity import flag_buried, flagged
 
 _TOUCHES, _ALWAYS_MM = 0.02, 1e-3     # share of the depth, and mm, that object and surface may be apart where they touch
+_REACHED = 0.99         # share of a depth, or of the largest force, from which it counts as reached: their search ends within 0.2 %
 
 
 class OnLayers:
@@ -84,6 +85,9 @@ class OnLayers:
         result = with_expected_error(sensor, press_underside(sensor, surface, checked_forces(force, sensor.spec.force_range_n,
                                                                                             sensor.spec.name)))
         result = flag_buried(result, float(placed.bounds[1, 2]) - first_touch_mm(sensor, surface))
+        if state.load_by == "depth" and force > _REACHED * (largest := sensor.spec.force_range_n[1]):
+            result = flagged(result, f"{largest:g} N, the sensor's largest force, is too little for the depth of "
+                             f"{state.depth_mm:g} mm", result.indentation_mm < _REACHED * state.depth_mm)
         return Press(state.sensor, state.object, values, force, "elastic", bool(mended.repairs)), result
 
     def _force(self, state, sensor, surface):

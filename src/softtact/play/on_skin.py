@@ -51,7 +51,8 @@ class OnSkin:
                                                                                elastomer=self._elastomer)
         force = float(f"{force:g}")
         press = Press(state.sensor, state.object, values, force, "elastic", bool(mended.repairs))
-        whole = self._results.get(press)
+        if whole := self._results.get(press):
+            press = replace(press, model=whole.model)
         result = whole or self._coarse.press(mended.mesh, pose=pose, force_n=force, model="elastic", label="", threads=1)
         lowered = placed.vertices[0] - pose.apply(mended.mesh.vertices[:1])[0] - [0.0, 0.0, result.indentation_mm[-1]]
         end = pose.translation_mm + lowered, pose.rotation.as_quat(scalar_first=True)

@@ -74,20 +74,27 @@ def board(result: PressResult, clearance_mm: np.ndarray | None = None, recorded:
 def comparison(result: PressResult, fast: PressResult) -> np.ndarray:
     """The `board` of a long model's result and its difference to a fast one's: blue where its own is less, red where more.
 
-    Of maps, or else of the first reading at places; without both the board alone.
+    Of maps, or else of the first reading at places; without both, and of one result twice, the board alone.
     """
     panels = _panels(result, None)
+    if result is fast:
+        return _beside(panels, caption=caption(result))
     if result.deformation_map_mm is not None and fast.deformation_map_mm is not None:
         apart = result.deformation_map_mm[-1] - fast.deformation_map_mm[-1]
         most = float(np.abs(apart).max())
-        image = Image.fromarray(coloured(apart[::-1], -most, most, "coolwarm"))
+        image = Image.fromarray(coloured(apart[::-1], *_around_zero(most), "coolwarm"))
         panels.append(_panel(image, f"less {fast.model}, up to {most:.3f} mm"))
-    elif result is not fast and (both := list(zip(places_of(result), places_of(fast), strict=False))):
+    elif both := list(zip(places_of(result), places_of(fast), strict=False)):
         apart = both[0][0].values - both[0][1].values
         most = float(np.abs(apart).max())
-        panels.append(_panel(_places_image(both[0][0], result, apart, (-most, most), "coolwarm"),
+        panels.append(_panel(_places_image(both[0][0], result, apart, _around_zero(most), "coolwarm"),
                              f"less {fast.model}, up to {most:.4g} {both[0][0].units}"))
     return _beside(panels, caption=caption(result))
+
+
+def _around_zero(most):
+    """Limits of the colours of a difference: no difference has the middle one."""
+    return -max(most, 1e-9), max(most, 1e-9)
 
 
 def caption(result: PressResult) -> str:
