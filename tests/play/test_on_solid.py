@@ -1,6 +1,7 @@
 """Solids on the page: the object only touches until the solid model has run, which is told; then its press is shown."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -82,3 +83,28 @@ def test_a_solid_that_rests_is_pressed_once_by_its_long_model(on_block, pressed_
     tab._next_press()
     assert tab._wanted is None
     assert tab.long_press(state) == tab.shown.press
+
+
+def test_a_place_that_was_pressed_is_not_pressed_again_where_the_object_comes_back(on_block, pressed_block, tmp_path, monkeypatch):
+    state, solver = on_block
+    solver.bench(state.sensor).take(solver.solve(state).press, pressed_block)
+    tab, started = Tab(state, SimpleNamespace(show_long=lambda *_: None), Folder(tmp_path), solver=solver), []
+
+    class Counted:
+        running, seconds, progress, press = True, 0.0, "", SimpleNamespace(model="solid")
+
+        def __init__(self, press, _):
+            started.append(press)
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("softtact.play.tab._RESTS_S", -1.0)
+    monkeypatch.setattr("softtact.play.tab.LongPress", Counted)
+    tab.long_on_release = True
+    for there, count in ((state, 0), (replace(state, x_mm=0.5), 1)):
+        tab.state = there
+        tab.shown = solver.solve(there)
+        tab._next_press()
+        tab._next_look()
+        assert len(started) == count

@@ -34,8 +34,16 @@ def test_the_newest_reading_at_a_time_is_shown_with_its_force(files):
     assert Recorded.read(files / "real.csv").at(0.1).force_n is None
     simulated = np.zeros((7, 4))
     simulated[5, 2] = 500.0 - 28
-    assert recorded.in_words(0.1, simulated) == (
+    assert recorded.in_words(0.1, simulated, 5.001) == (
         "real.csv at 0.10 s, 5 N: 500 counts in all; simulated 472, and 1 apart in the mean over taxels.")
+
+
+def test_a_reading_is_compared_with_a_press_by_its_force_alone(files):
+    recorded, simulated = Recorded.read(files / "real.csv", log=files / "log.csv"), np.zeros((7, 4))
+    for time_s, pressed_n, compared in ((0.0, 5.0, False), (0.1, 5.0, True), (0.2, 5.0, False), (0.2, 10.005, True)):
+        words = recorded.in_words(time_s, simulated, pressed_n)
+        assert ("apart in the mean" in words) == compared and ("; not pressed with this force." in words) != compared
+    assert "apart in the mean" in Recorded.read(files / "real.csv").in_words(0.0, simulated, 5.0)     # its force is not known
 
 
 def test_recorded_taxels_stand_beside_the_simulated_ones_in_the_same_colours(state, solver):

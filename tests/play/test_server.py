@@ -91,13 +91,19 @@ def test_a_refused_press_says_whose_the_scene_is(state):
     assert "the press before, on gelsight\\_mini." in _refused("It misses.", before)
 
 
-def test_what_cannot_be_played_is_refused_before_the_server_starts(tmp_path, capsys, monkeypatch):
+def test_what_cannot_be_played_is_refused_before_the_server_starts(folder, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("softtact.play.server.PlayServer", lambda *_, **__: pytest.fail("the server started"))
+    (tmp_path / "solid.yaml").write_text((folder / "block.yaml").read_text().replace("block.vtu", "nowhere.vtu"))
+    (tmp_path / "layers.yaml").write_text((folder / "gel.yaml").read_text().replace("gel_silicone", "unobtainium"))
     (tmp_path / "broken.stl").write_bytes(b"solid nothing")
     for arguments, words in ((["--port", "99999"], "--port 99999"), (["broken.stl", "--unit", "mm"], "broken.stl"),
-                             (["--sensor", "nowhere"], "no sensor"), (["--out", "broken.stl"], "broken.stl")):
+                             (["--sensor", "nowhere"], "no sensor"), (["--out", "broken.stl"], "broken.stl"),
+                             (["--sensor", "solid.yaml"], "nowhere.vtu"), (["--sensor", "layers.yaml"], "unobtainium"),
+                             (["--unit", "inch"], "--unit inch: it is the unit of the meshes that are given; add MESH")):
         assert main(["play", "--no-open", *arguments]) == 1
-        assert words in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert words in said and said.count("\n") == 1
 
 
 @needs_browser

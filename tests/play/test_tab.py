@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from softtact.errors import InputError
 from softtact.play.files import Folder
 from softtact.play.long_press import LongPress
 from softtact.play.recorded import Recorded
@@ -104,6 +105,16 @@ def test_a_press_that_fails_is_told_once_and_the_next_one_is_shown(tab, seen, mo
     assert "unexpected ZeroDivisionError" in seen.refused[1]
 
 
+def test_the_press_that_is_shown_is_told_again_where_the_object_returns_to_it(tab, seen):
+    wait_for(lambda: seen.shown and not seen.shown[-1].draft)
+    tab.change(x_mm=90.0)
+    wait_for(lambda: seen.refused)
+    count = len(seen.shown)
+    tab.change(x_mm=0.0)
+    wait_for(lambda: len(seen.shown) > count)
+    assert seen.shown[-1] is seen.shown[count - 1] and len(seen.refused) == 1
+
+
 def test_a_recording_is_played_again_and_becomes_a_movie(tab, seen, tmp_path):
     pytest.importorskip("av")
     wait_for(lambda: seen.shown)
@@ -117,6 +128,34 @@ def test_a_recording_is_played_again_and_becomes_a_movie(tab, seen, tmp_path):
     tab.save_movie()
     wait_for(lambda: any("Saved" in one for one in seen.told))
     assert (tmp_path / "out/recording_1.mp4").stat().st_size > 1000
+
+
+def test_moments_without_a_map_show_the_frame_before_or_else_the_first(tab, state):
+    beside, there = replace(state, x_mm=90.0), replace(state, x_mm=0.5)
+    first, *others = tab._frames([(0.0, beside), (0.15, state), (0.35, beside), (0.55, there)])
+    same = [np.array_equal(first, frame) for frame in others]
+    assert same == [True] * 5 + [False] * (len(same) - 5) and len(same) >= 6
+    with pytest.raises(InputError, match="misses the sensor"):
+        list(tab._frames([(0.0, beside), (0.2, beside)]))
+
+
+def test_a_recording_with_a_refused_moment_becomes_a_movie(tab, seen, state, tmp_path):
+    pytest.importorskip("av")
+    assert tab.record()
+    for x in (90.0, 0.5):
+        time.sleep(0.15)
+        tab.change(x_mm=x)
+    tab.record()
+    tab.save_movie()
+    wait_for(lambda: any("Saved" in one or "misses" in one for one in seen.told))
+    assert "Saved" in seen.told[-1] and (tmp_path / "out/recording_1.mp4").stat().st_size > 1000
+
+
+def test_a_recording_that_has_its_longest_time_says_so(tab, seen, monkeypatch):
+    tab.record()
+    monkeypatch.setattr("softtact.play.tab.LONGEST_S", -1.0)
+    tab.change(force_n=20.0)
+    assert "what you change now is not kept" in seen.told[-1]
 
 
 def test_a_recording_of_a_real_sensor_plays_and_presses_with_its_force(tab, seen):
@@ -148,6 +187,22 @@ def test_saved_files_hold_the_press_that_is_shown(tab, seen, tmp_path):
     kept = read_press(tmp_path / "out/press_2_elastic.nc")
     np.testing.assert_array_equal(kept.deformation_map_mm, seen.shown[-1].result.deformation_map_mm)
     assert seen.shown[-1].press.command in (tmp_path / "out/press_1.txt").read_text()
+
+
+def test_a_long_result_is_saved_with_the_command_that_made_it_and_over_no_other_file(tab, seen, tmp_path):
+    wait_for(lambda: seen.shown and not seen.shown[-1].draft)
+    shown = tab.shown
+    for number, model in ((1, "foundation"), (2, "elastic")):     # auto may choose the elastic one
+        tab._long_of = tab.state, replace(shown.press, model="auto"), replace(shown.result, model=model)
+        tab.save()
+        wait_for(lambda number=number: len(seen.told) == number)
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {f"press_{end}" for end in ("1.txt", "1_elastic.nc", "1_elastic.png", "1_foundation.nc", "1_foundation.png",
+                                                "2.txt", "2_elastic.nc", "2_elastic.png", "2_elastic_long.nc",
+                                                "2_elastic_long.png")}
+    for name, model in (("1_foundation", "auto"), ("2_elastic_long", "auto"), ("2_elastic", "elastic")):
+        assert f"--model {model} " in read_press(tmp_path / f"out/press_{name}.nc").attributes["command"]
+        assert f"--model {model} " in (tmp_path / f"out/press_{name[0]}.txt").read_text()
 
 
 def test_a_long_press_is_started_compared_and_leaves_no_files(tab, seen, tmp_path, monkeypatch):
@@ -210,3 +265,20 @@ def test_a_long_model_gets_slide_and_twist_as_a_motion(tab, state):
     assert press.load == "fz -10; x 1 in 5; rz 10 in 3" and press.pose[:2] == pytest.approx((-3.0, 2.0))
     tab.long_model = "foundation"
     assert tab.long_press(moved).load == 10.0
+
+
+def test_a_long_press_by_depth_has_the_force_of_the_whole_map(tab, seen, state, solver):
+    by_depth = replace(state, load_by="depth", depth_mm=0.5)
+    tab.close()
+    tab._thread.join(30)
+    tab.shown = solver.solve(by_depth, draft=True)
+    tab.long_model = "foundation"
+    press = tab.long_press(by_depth)
+    assert press.load == solver.solve(by_depth).press.load and press.load != tab.shown.press.load
+
+
+def test_a_twist_is_not_given_to_the_hyperelastic_model(tab, state):
+    tab.long_model = "hyperelastic"
+    assert tab.long_press(replace(state, slide_mm=(1.0, 0.0))).load == "fz -10; x 1 in 5"
+    with pytest.raises(InputError, match="does not twist an object; set the twist to 0, or run the solid model"):
+        tab.long_press(replace(state, twist_deg=10.0))

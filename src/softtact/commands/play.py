@@ -46,13 +46,16 @@ def _play(options):
 
     if not 0 <= options.port < 65536:
         raise InputError(f"--port {options.port}: give a number from 0 to 65535.")
-    any_sensor_spec(options.sensor)
+    if options.unit and not options.mesh:
+        raise InputError(f"--unit {options.unit}: it is the unit of the meshes that are given; add MESH, or leave it out.")
+    solver = Solver()
+    solver.bench(options.sensor)     # a file that it names may be missing
     check_output_folder(options.out)
     given = {path.name: Object(path, options.unit) for path in options.mesh}
     if len(given) < len(options.mesh):
         raise InputError("Two of the meshes have one name; rename one of them.")
     for one in given.values():
-        Solver().mesh(one)
+        solver.mesh(one)
     objects = given | {name: Object(path, unit) for name, path, unit in _shipped() if name not in given}
     recorded = _recorded(options)
     first = next(iter(given.values()), objects[_FIRST])

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import count
 from pathlib import Path, PurePosixPath
 
@@ -28,19 +29,22 @@ class Folder:
         check_output_folder(path)
         self.path = path
 
-    def save_press(self, press: Press, result: PressResult, also: PressResult | None = None) -> list[Path]:
-        """Write NetCDF, PNG and a text with the command line and the Python lines; return the files.
+    def save_press(self, *pressed: tuple[Press, PressResult]) -> list[Path]:
+        """Write NetCDF and PNG of each result, and a text with the command line and the Python lines of each; return the files.
 
-        also: the result of another model for the same press, which is written, too
+        pressed: the press that is shown, and that of a long model at the same place, if there is one
         """
         with self._new("press", ".txt") as text:
             written = [text]
-            for one in [result] + ([also] if also else []):
-                stem = text.with_name(f"{text.stem}_{one.model}")
-                one.write(stem.with_suffix(".nc"), settings={"command": press.command})
-                one.plot(stem.with_suffix(".png"))
+            for press, result in pressed:
+                stem = text.with_name(f"{text.stem}_{result.model}")
+                if stem.with_suffix(".nc") in written:     # the long model was auto, which chose the fast one
+                    stem = text.with_name(f"{stem.name}_long")
+                with_command = replace(result, attributes=result.attributes | {"command": press.command})
+                with_command.write(stem.with_suffix(".nc"), settings={"command": press.command})
+                result.plot(stem.with_suffix(".png"))
                 written += [stem.with_suffix(".nc"), stem.with_suffix(".png")]
-            text.write_text(f"{press.command}\n\n{press.python}\n", encoding="utf-8")
+            text.write_text("\n".join(f"{press.command}\n\n{press.python}\n" for press, _ in pressed), encoding="utf-8")
         return written
 
     def save_movie(self, frames: Iterable[np.ndarray]) -> Path:

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from softtact.errors import SofttactError
 from softtact.play import pictures
-from softtact.play.bench import Bench
+from softtact.play.bench import Bench, force_span_n
 from softtact.play.files import Folder
 from softtact.play.recorded import Recorded
 from softtact.play.solver import Shown
-from softtact.play.state import Object, State
-from softtact.play.tab import LEAST_FORCE_N, Tab
+from softtact.play.state import Object, State, free_name
+from softtact.play.tab import LONGEST_S, Tab
 from softtact.press.result import PressResult
 
 UNITS = ("mm", "cm", "m", "inch")
@@ -43,6 +43,7 @@ class Page:
         self._sensor_shown = ""
         self._gizmo_from = np.zeros(3)
         self._depth_from = 0.0
+        self._long_said = "Not run."
         self.tab = Tab(state, self, folder)
         state = self.tab.state = replace(state, **self._borne(state, state.sensor))
         self._build_panel(state, sensors)
@@ -61,6 +62,7 @@ class Page:
             self._show_sensor(shown)
             self._show_object(shown)
             self._show_board(shown)
+            self._show_long_words()
             self._numbers.content = self._table(shown)
             self._same.content = f"```bash\n{shown.press.command_lines}\n```\n```python\n{shown.press.python}\n```"
 
@@ -75,15 +77,22 @@ class Page:
     def show_long(self, words: str, result: PressResult | None, fast: Shown | None) -> None:
         """Show a long press: its progress, or its end with the difference to the fast model's of the same press."""
         if result is None:
-            self._long_words.content = _plain(words)
+            self._long_said, self._difference.visible = _plain(words), False
+            self._show_long_words()
             return
         lines = [f"**{_plain(words)}**: {result.indentation_mm[-1]:.3f} mm deep{_apart(result, fast)}."]
         if result.selection_reason:
             lines.append(f"Why this model: {_plain(result.selection_reason)}.")
         lines += [f"Not within validity: {why}." for why in result.validity_reason[-1:] if why]
-        self._long_words.content = "\n\n".join(lines)
+        self._long_said = "\n\n".join(lines)
+        self._show_long_words()
         self._difference.image = pictures.comparison(result, fast.result if fast else result)
         self._difference.visible = True
+
+    def _show_long_words(self):
+        """The words on the last long press, which may be that of an earlier state."""
+        earlier = self.tab.long_state not in (None, self.tab.state)
+        self._long_words.content = ("Of an earlier press: " if earlier else "") + self._long_said
 
     def show_recorded(self) -> None:
         """Show the recording's reading at the present time."""
@@ -99,7 +108,8 @@ class Page:
         counts = None if recorded is None else recorded.at(time_s).counts
         self._board.image = pictures.board(shown.result, shown.clearance_mm, counts)
         if recorded is not None:
-            self._recorded_words.content = _plain(recorded.in_words(time_s, pictures.taxels_of(shown.result)))
+            self._recorded_words.content = _plain(recorded.in_words(time_s, pictures.taxels_of(shown.result),
+                                                                    float(shown.result.normal_force_n[-1])))
 
     # --- panel ---
 
@@ -111,7 +121,8 @@ class Page:
         self._numbers = gui.add_markdown("The first map follows.")
         with gui.add_folder("Load"):
             self._load_by = gui.add_dropdown("load by", ("force", "depth"), initial_value=state.load_by)
-            self._force = gui.add_slider("force, N", LEAST_FORCE_N, 50.0, 0.01, state.force_n, visible=state.load_by == "force")
+            self._force = gui.add_slider("force, N", *force_span_n(self.tab.solver.bench(state.sensor)), 0.01, state.force_n,
+                                         visible=state.load_by == "force")
             self._depth = gui.add_slider("depth, mm", 0.01, 2.0, 0.01, state.depth_mm, visible=state.load_by == "depth")
             self._slide_x = gui.add_slider("slide x, mm", -5.0, 5.0, 0.1, 0.0)
             self._slide_y = gui.add_slider("slide y, mm", -5.0, 5.0, 0.1, 0.0)
@@ -156,8 +167,9 @@ class Page:
         self._play.on_click(lambda _: self.tab.play_recorded())
 
     def _take_recording(self, file):
+        finger = self.tab.recorded.finger if self.tab.recorded else 0
         try:
-            self._show_recording(Recorded.read(self._folder.keep_upload(file.name, file.content)))
+            self._show_recording(Recorded.read(self._folder.keep_upload(file.name, file.content), finger=finger))
         except SofttactError as error:
             self._recorded_words.content = _plain(str(error))
 
@@ -172,8 +184,8 @@ class Page:
         on(self._load_by, self._choose_load)
         on(self._force, lambda: self.tab.change(force_n=float(self._force.value)))
         on(self._depth, lambda: self.tab.change(depth_mm=float(self._depth.value)))
-        for slide in (self._slide_x, self._slide_y):
-            on(slide, lambda: self.tab.change(slide_mm=(float(self._slide_x.value), float(self._slide_y.value))))
+        on(self._slide_x, lambda: self.tab.change(slide_mm=(float(self._slide_x.value), self.tab.state.slide_mm[1])))
+        on(self._slide_y, lambda: self.tab.change(slide_mm=(self.tab.state.slide_mm[0], float(self._slide_y.value))))
         on(self._twist, lambda: self.tab.change(twist_deg=float(self._twist.value)))
         on(self._object, lambda: self.tab.change(object=self._objects[self._object.value]))
         on(self._sensor, self._choose_sensor)
@@ -183,7 +195,7 @@ class Page:
         on(self._long, lambda: setattr(self.tab, "long_model", self._long.value))
         centre.on_click(lambda _: self.tab.change(x_mm=0.0, y_mm=0.0, rotation_deg=(0.0, 0.0, 0.0), slide_mm=(0.0, 0.0),
                                                   twist_deg=0.0))
-        run.on_click(lambda _: self.tab.run_long(self._long.value) if run.value == "Run" else self.tab.abandon_long())
+        run.on_click(lambda _: self._run_long() if run.value == "Run" else self.tab.abandon_long())
         self._record.on_click(lambda _: self._toggle_record())
         replay.on_click(lambda _: self.tab.replay())
         movie.on_click(lambda _: self.tab.save_movie())
@@ -200,13 +212,20 @@ class Page:
             self._fit_panel(self._sensor.value)
             self.tab.change(sensor=self._sensor.value, **self._borne(self.tab.state, self._sensor.value))
         except SofttactError as error:
+            self._sensor.value = self.tab.state.sensor     # the panel is still as that sensor has it
             self.refuse(str(error))
+
+    def _run_long(self):
+        try:
+            self.tab.run_long(self._long.value)
+        except SofttactError as error:
+            self.tell(str(error))
 
     def _fit_panel(self, name):
         """Ranges of the loads and long models as a sensor has them."""
         bench = self.tab.solver.bench(name)
         self._panel_of = name
-        self._force.max, self._depth.max = float(bench.force_range_n[1]), _deepest_mm(bench)
+        (self._force.min, self._force.max), self._depth.max = force_span_n(bench), _deepest_mm(bench)
         self._on_release.value = self.tab.long_on_release = bench.long_on_release
         self._long.options = bench.models
         self._long.value = self.tab.long_model = bench.models[0]
@@ -214,12 +233,13 @@ class Page:
     def _borne(self, state, name):
         """The load of a state, as far as a sensor bears it."""
         bench = self.tab.solver.bench(name)
-        return {"force_n": min(state.force_n, bench.first_force_n), "depth_mm": min(state.depth_mm, _deepest_mm(bench))}
+        force = float(np.clip(state.force_n, force_span_n(bench)[0], bench.first_force_n))
+        return {"force_n": force, "depth_mm": min(state.depth_mm, _deepest_mm(bench))}
 
     def _toggle_record(self):
         records = self.tab.record()
         self._record.label = "End the recording" if records else "Record"
-        self.tell("Recording: what you change is kept." if records else "Recorded.")
+        self.tell(f"Recording: what you change is kept, for at most {LONGEST_S:.0f} s." if records else "Recorded.")
 
     def _take_upload(self):
         file = self._upload.value
@@ -228,12 +248,13 @@ class Page:
         except SofttactError as error:
             self.tell(str(error))
             return
-        unit = None if self._unit.value == "of the file" else self._unit.value
-        self._objects[path.name] = Object(path, unit)
+        new = Object(path, None if self._unit.value == "of the file" else self._unit.value)
+        name = free_name(self._objects, new)
+        self._objects[name] = new
         self._object.options = tuple(self._objects)
-        self._object.value = path.name
+        self._object.value = name
         self.tell(f"Kept {path}.")
-        self.tab.change(object=self._objects[path.name], x_mm=0.0, y_mm=0.0, rotation_deg=(0.0, 0.0, 0.0))
+        self.tab.change(object=new, x_mm=0.0, y_mm=0.0, rotation_deg=(0.0, 0.0, 0.0))
 
     def _name_of(self, of: Object) -> str:
         return next(name for name, one in self._objects.items() if one == of)
@@ -256,7 +277,7 @@ class Page:
     def _loaded(self, state, times):
         if state.load_by == "depth":
             return {"depth_mm": float(np.clip(state.depth_mm * times, _LEAST_DEPTH_MM, self._depth.max))}
-        return {"force_n": round(float(np.clip(state.force_n * times, LEAST_FORCE_N, self._force.max)), 2)}
+        return {"force_n": float(np.clip(round(state.force_n * times, 2), self._force.min, self._force.max))}
 
     def _table(self, shown):
         """The numbers of a press as Markdown."""
@@ -302,8 +323,8 @@ class Page:
 
     def _show_sensor(self, shown):
         surface, tiles = pictures.surface_mesh(shown.result), pictures.taxel_mesh(shown.result)
-        if shown.state.sensor != self._panel_of:
-            self._fit_panel(shown.state.sensor)
+        if (sensor := self.tab.state.sensor) != self._panel_of:
+            self._fit_panel(sensor)
         if shown.state.sensor != self._sensor_shown:
             self._new_sensor(surface, tiles)
             self._sensor_shown = shown.state.sensor
@@ -347,11 +368,12 @@ class Page:
             height = (Rotation.from_quat(shown.end[1], scalar_first=True).apply(mesh.bounds.mean(axis=0)) + shown.end[0])[2]
             x, y, _ = self.tab.solver.bench(state.sensor).middle_mm
             self._gizmo.position, self._gizmo.wxyz = (state.x_mm + x, state.y_mm + y, height), turn.as_quat(scalar_first=True)
-        self._show_state(state)
+        self._show_state(self.tab.state)     # which may be newer than that of a press that took long
 
     def _show_state(self, state):
         """Widgets as the state is, which the gizmo, a key or a replay may have changed."""
-        self._force.value, self._depth.value = min(state.force_n, self._force.max), min(state.depth_mm, self._depth.max)
+        self._force.value = float(np.clip(state.force_n, self._force.min, self._force.max))
+        self._depth.value = min(state.depth_mm, self._depth.max)
         self._slide_x.value, self._slide_y.value = state.slide_mm
         self._twist.value = state.twist_deg
         self._place.value, self._turn.value = (state.x_mm, state.y_mm), state.rotation_deg

@@ -9,6 +9,8 @@ from softtact.errors import InputError
 from softtact.readout.recording import FINGERS
 from softtact.readout.sources import recording_of, with_force_of
 
+_ROUND_N, _ROUND = 0.01, 1e-3     # in N, to which the page rounds a recorded force, and the share within which a press balances it
+
 
 @dataclass(frozen=True)
 class Recorded:
@@ -22,6 +24,8 @@ class Recorded:
     """(t, rows, columns) over the baseline."""
     force_n: np.ndarray | None
     """(t,) normal force on the finger, where a log of forces was given."""
+    finger: int = 0
+    """The finger's number."""
 
     @classmethod
     def read(cls, path: str | Path, *, log: str | Path | None = None, finger: int = 0) -> "Recorded":
@@ -32,7 +36,7 @@ class Recorded:
         if log is not None:
             data = with_force_of(data, log)
         return cls(Path(path).name, data.time.values.astype(float), data.counts.values[:, finger].astype(float),
-                   data.force_n.values[:, finger].astype(float) if "force_n" in data else None)
+                   data.force_n.values[:, finger].astype(float) if "force_n" in data else None, finger)
 
     @property
     def duration_s(self) -> float:
@@ -45,14 +49,15 @@ class Recorded:
         return Reading(float(self.time_s[place]), self.counts[place],
                        None if self.force_n is None else float(self.force_n[place]))
 
-
-    def in_words(self, time_s: float, simulated: np.ndarray | None) -> str:
-        """The reading at a time in s beside simulated counts (rows, columns), as a sentence."""
+    def in_words(self, time_s: float, simulated: np.ndarray | None, pressed_n: float) -> str:
+        """The reading at a time in s beside simulated counts (rows, columns) of a press with a force in N, as a sentence."""
         reading = self.at(time_s)
         force = "" if reading.force_n is None else f", {reading.force_n:.4g} N"
         words = f"{self.name} at {reading.time_s:.2f} s{force}: {reading.counts.sum():.0f} counts in all"
         if simulated is None or simulated.shape != reading.counts.shape:
             return f"{words}."
+        if not reading.has_force(pressed_n):
+            return f"{words}; not pressed with this force."
         apart = float(np.abs(simulated - reading.counts).mean())
         return f"{words}; simulated {simulated.sum():.0f}, and {apart:.0f} apart in the mean over taxels."
 
@@ -67,3 +72,10 @@ class Reading:
     """(rows, columns) over the baseline."""
     force_n: float | None
     """Where it is known."""
+
+    def has_force(self, pressed_n: float) -> bool:
+        """Whether a press with a normal force in N has this reading's force, or that is not known.
+
+        It has not where the page cannot press so: at a reading without contact, or beyond the sensor's range.
+        """
+        return self.force_n is None or abs(pressed_n - self.force_n) <= _ROUND_N + _ROUND * abs(self.force_n)

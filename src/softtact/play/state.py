@@ -2,8 +2,9 @@
 
 import shlex
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from typing import Literal
 
@@ -23,6 +24,13 @@ class Object:
     """The file."""
     unit: str | None
     """Of the file; None where the format states it."""
+
+
+def free_name(objects: Mapping[str, Object], new: Object) -> str:
+    """A name for a new object among others: its file's, with its unit or a number where another object has that name."""
+    name = new.path.name
+    names = chain([name], [f"{name} ({new.unit})"] if new.unit else [], (f"{name}, {number}" for number in count(2)))
+    return next(one for one in names if objects.get(one, new) == new)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from softtact.errors import InputError, SofttactError
+from softtact.play.bench import LEAST_FORCE_N, Bench
 from softtact.play.files import FPS, Folder
 from softtact.play.long_press import LongPress
 from softtact.play.pictures import board
@@ -24,8 +25,7 @@ from softtact.press.result import PressResult
 
 _RESTS_S = 0.35         # without a change, after which the whole map follows
 _LOOK_S = 0.1           # between two looks at a long press
-_LONGEST_S = 300.0      # of a recording
-LEAST_FORCE_N = 0.1     # of the page
+LONGEST_S = 300.0       # of a recording
 
 
 class View(Protocol):
@@ -58,8 +58,9 @@ class Tab:
         self.long_on_release = False
         self.shown: Shown | None = None
         self._long: LongPress | None = None
-        self._long_state = state
-        self._long_of: tuple[State, PressResult] | None = None
+        self.long_state: State | None = None
+        """Of the long press that was started last."""
+        self._long_of: tuple[State, Press, PressResult] | None = None
         self._wanted: State | None = None           # for a long press
         self._released: State | None = None         # for which one was started
         self._stop_long = False
@@ -131,8 +132,11 @@ class Tab:
 
     def _note(self, recording):
         now = time.monotonic()
-        if now - recording[0][0] <= _LONGEST_S:
+        if now - recording[0][0] <= LONGEST_S:
             recording.append((now, self.state))
+        else:
+            self._view.tell(f"A recording takes at most {LONGEST_S:.0f} s, which have passed: what you change now is not kept. End "
+                            "the recording.")
 
     def replay(self) -> None:
         """Play the recording in real time, in a thread of its own."""
@@ -155,22 +159,37 @@ class Tab:
         return self._recorded
 
     def _frames(self, recorded: list[tuple[float, State]]) -> Iterator[np.ndarray]:
-        """Pictures of a recording at `FPS`, all as large as the first."""
+        """Pictures of a recording at `FPS`, all as large as the first; a state without a map has that before, or else the first.
+
+        Raises SofttactError, as the first state does, where no state has a map.
+        """
         times = np.array([moment for moment, _ in recorded])
         moments = np.arange(times[0], times[-1] + 1 / FPS, 1 / FPS)
-        shape, last, frame = None, None, None
+        waiting, last = 0, None     # frames before the first map
+        frame: np.ndarray | None = None
+        why: SofttactError | None = None
         for number, moment in enumerate(moments):
             if self._closed.is_set():
                 raise InputError("The tab was closed while its movie was written; record again.")
             state = recorded[int(np.searchsorted(times, moment, side="right")) - 1][1]
-            if frame is None or state != last:
-                shown = self.solver.solve(state, draft=True)
-                frame, last = board(shown.result, shown.clearance_mm), state
-                shape = shape or frame.shape
-                frame = _fitted(frame, shape)
+            if state != last:
+                last = state
+                try:
+                    shown = self.solver.solve(state, draft=True)
+                    picture = board(shown.result, shown.clearance_mm)
+                    frame = picture if frame is None else _fitted(picture, frame.shape)
+                except SofttactError as error:
+                    why = why or error
             if number % int(FPS) == 0:
                 self._view.tell(f"Writing the movie: {number} of {len(moments)} frames.")
-            yield frame
+            if frame is None:
+                waiting += 1
+                continue
+            for _ in range(waiting + 1):
+                yield frame
+            waiting = 0
+        if frame is None and why is not None:
+            raise why
 
     # --- a recording of a real sensor ---
 
@@ -225,8 +244,10 @@ class Tab:
         if shown.stage != "whole":
             raise InputError(f"This press is not whole: the {shown.press.model} model has not run for it; press Run, and save when "
                              "it has ended.")
-        also = self._long_of[1] if self._long_of and self._long_of[0] == state else None
-        files = self._folder.save_press(shown.press, shown.result, None if also is shown.result else also)
+        pressed = [(shown.press, shown.result)]
+        if self._long_of and self._long_of[0] == state and self._long_of[2] is not shown.result:
+            pressed.append(self._long_of[1:])
+        files = self._folder.save_press(*pressed)
         self._view.tell("Saved " + ", ".join(map(str, files)) + ".")
 
     def _aside(self, work: Callable[[], None]) -> None:
@@ -265,16 +286,20 @@ class Tab:
             state, rests = self.state, not self.held and time.monotonic() - self._changed > _RESTS_S
         if state == self._refused:
             return
+        if self._refused is not None and self.shown is not None and self.shown.state == state:
+            self._publish(self.shown)     # in place of the sentence that refused a state between
+            return
         try:
-            new, refines = self.shown is None or self.shown.state != state, self.solver.bench(state.sensor).refines
-            if new or rests and refines and self.shown.draft:
+            new, bench = self.shown is None or self.shown.state != state, self.solver.bench(state.sensor)
+            if new or rests and bench.refines and self.shown.draft:
                 if new or self._is_ready(state.sensor):
                     self._publish(self.solver.solve(state, draft=new))
                 return
         except BaseException:
             self._refused = state
             raise
-        if rests and self.long_on_release and self._long is None and state != self._released:
+        whole = self.shown.stage == "whole" and self.shown.result.model == self._long_model(bench)
+        if rests and self.long_on_release and self._long is None and state != self._released and not whole:
             with self._lock:
                 self._wanted = self._released = state
 
@@ -307,13 +332,13 @@ class Tab:
         if self._long.running:
             self._view.show_long(f"{self._long.press.model}, {self._long.seconds:.0f} s: {self._long.progress}", None, None)
             return
-        state, long = self._long_state, self._long
+        state, long = self.long_state, self._long
         try:
             result = long.result()
             if long.stopped:
                 self._view.show_long(f"{result.model}, stopped after load step {result.steps}: {long.stopped}", result, None)
                 return
-            self._long_of = state, result
+            self._long_of = state, long.press, result
             fast = self.solver.solve(state)
             self.solver.bench(state.sensor).take(long.press, result)
             if state == self.state and (shown := self.solver.solve(state)).result is result:
@@ -323,19 +348,31 @@ class Tab:
             self._end_long()
 
     def _start_long(self, state):
+        self.long_state = state
         press = self.long_press(state)
-        self._long, self._long_state = LongPress(press, self._folder.path), state
+        self._long = LongPress(press, self._folder.path)
         self._view.show_long(f"{press.model}: starting", None, None)
 
     def long_press(self, state: State) -> Press:
-        """The press of a state by the long model that is chosen: with slide and twist as a motion where that model follows it."""
-        shown = self.shown if self.shown and self.shown.state == state else self.solver.solve(state, draft=True)
-        bench = self.solver.bench(state.sensor)
-        model = self.long_model if self.long_model in bench.models else bench.models[0]
+        """The press of a state by the long model that is chosen: with slide and twist as a motion where that model follows it.
+
+        Raises InputError for a twist that the model does not follow.
+        """
+        bench, by_depth = self.solver.bench(state.sensor), state.load_by == "depth"
+        model = self._long_model(bench)
+        if model == "hyperelastic" and state.twist_deg:
+            raise InputError("The hyperelastic model does not twist an object; set the twist to 0, or run the solid model.")
+        shown = self.shown
+        if shown is None or shown.state != state or shown.draft and by_depth:     # whose force is that of the coarse map
+            shown = self.solver.solve(state, draft=not by_depth)
         if not state.moves or not bench.follows(model) or isinstance(shown.press.load, str):
             return replace(shown.press, model=model)
         pose = state.pose(self.solver.mesh(state.object), moved=False, middle_mm=bench.middle_mm)
         return replace(shown.press, model=model, pose=pose, load=state.motion(shown.press.load))
+
+    def _long_model(self, bench: Bench) -> str:
+        """The long model that is chosen, or else that of choice."""
+        return self.long_model if self.long_model in bench.models else bench.models[0]
 
     def _end_long(self):
         if self._long is not None:
