@@ -28,6 +28,7 @@ _SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 _DISC, _CORNERS = 0.05, 24      # radius of a place, as a share of the longer side, where its readout states none; corners of it
 _RIM = 1.1              # radius of the rim around a taxel on a module, over the taxel's
 _UNDER = 0.003          # of the longer side: depth of a module's triangle below its taxels
+_NO_DIFFERENCE = 1e-9    # least limit of the colours of a difference: where there is none, it has the middle one
 
 
 @cache
@@ -81,20 +82,15 @@ def comparison(result: PressResult, fast: PressResult) -> np.ndarray:
         return _beside(panels, caption=caption(result))
     if result.deformation_map_mm is not None and fast.deformation_map_mm is not None:
         apart = result.deformation_map_mm[-1] - fast.deformation_map_mm[-1]
-        most = float(np.abs(apart).max())
-        image = Image.fromarray(coloured(apart[::-1], *_around_zero(most), "coolwarm"))
+        most = max(float(np.abs(apart).max()), _NO_DIFFERENCE)
+        image = Image.fromarray(coloured(apart[::-1], -most, most, "coolwarm"))
         panels.append(_panel(image, f"less {fast.model}, up to {most:.3f} mm"))
     elif both := list(zip(places_of(result), places_of(fast), strict=False)):
         apart = both[0][0].values - both[0][1].values
-        most = float(np.abs(apart).max())
-        panels.append(_panel(_places_image(both[0][0], result, apart, _around_zero(most), "coolwarm"),
+        most = max(float(np.abs(apart).max()), _NO_DIFFERENCE)
+        panels.append(_panel(_places_image(both[0][0], result, apart, (-most, most), "coolwarm"),
                              f"less {fast.model}, up to {most:.4g} {both[0][0].units}"))
     return _beside(panels, caption=caption(result))
-
-
-def _around_zero(most):
-    """Limits of the colours of a difference: no difference has the middle one."""
-    return -max(most, 1e-9), max(most, 1e-9)
 
 
 def caption(result: PressResult) -> str:
