@@ -165,7 +165,7 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
 
 
 # Options with an effect only on the hyperelastic model, on laws (which the elastic model has none of), or on the choice.
-_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation", "solid"), "device": ("elastic", "foundation"),
+_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation", "solid"), "device": ("elastic", "foundation", "solid"),
          "policy": MODELS[1:], "tolerance": MODELS[1:]}
 _DEFAULTS = {"card": None, "mesh_quality": "default", "device": "cpu", "policy": "error", "tolerance": 0.01}
 _REMEDIES = {"mesh_quality": "give a finer mesh to the sensor's file"}     # of options without effect on sensors without layers
@@ -173,14 +173,13 @@ _REMEDIES = {"mesh_quality": "give a finer mesh to the sensor's file"}     # of 
 
 def _refuse_idle(options, spec):
     """Refuse an option without effect: on this sensor, in the named model, or because another option is missing."""
-    if not spec.has_layers:
-        if options.model not in ("auto", *spec.models):
-            raise InputError(f"--model {options.model}: a sensor of kind {spec.kind}, such as {options.sensor}, is pressed "
-                             f"only with the {' or the '.join(spec.models)} model; leave it out.")
-        for name in ("policy", "tolerance", "mesh_quality", *(["device"] if spec.kind == "skin" else [])):
-            if getattr(options, name) != _DEFAULTS[name]:
-                raise InputError(f"{_given(options, name)}: it has no effect on a sensor of kind {spec.kind}; "
-                                 f"{_REMEDIES.get(name, 'leave it out')}.")
+    if not spec.has_layers and options.model not in ("auto", *spec.models):
+        raise InputError(f"--model {options.model}: a sensor of kind {spec.kind}, such as {options.sensor}, is pressed "
+                         f"only with the {' or the '.join(spec.models)} model; leave it out.")
+    names, on, remedy = _idle_on(spec, options.model)
+    for name in names:
+        if getattr(options, name) != _DEFAULTS[name]:
+            raise InputError(f"{_given(options, name)}: it has no effect on {on}; {remedy.get(name, 'leave it out')}.")
     for name, models in _IDLE.items():
         if spec.has_layers and options.model in models and getattr(options, name) != _DEFAULTS[name]:
             raise InputError(f"{_given(options, name)}: it has no effect on the {options.model} model; "
@@ -191,6 +190,16 @@ def _refuse_idle(options, spec):
     if options.full_scale and not (options.plot and has_taxels):
         raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out." if has_taxels
                          else "--full-scale: it has no effect on a sensor without taxels; leave it out.")
+
+
+def _idle_on(spec, model):
+    """Options without effect on a sensor, what it is in words, and their remedies, where it is not to leave them out."""
+    idle = ("policy", "tolerance", "mesh_quality")
+    if not spec.has_layers:
+        return (*idle, *(["device"] if spec.kind == "skin" else [])), f"a sensor of kind {spec.kind}", _REMEDIES
+    if spec.edge.far and model == "auto":
+        return (*idle, "device"), "a gel, for which auto is the elastic model, or the solid one where that cannot follow", {}
+    return (), "", {}
 
 
 def _given(options, name):
@@ -235,7 +244,7 @@ def _how(options, spec):
                 raise InputError(f"--{name} {getattr(options, name)}: it has no effect on a motion other than straight down by "
                                  "forces, for which auto is the hyperelastic model; leave it out.")
         if (options.mesh_quality != _DEFAULTS["mesh_quality"] and options.model == "auto" and spec.has_layers
-                and (spec.edge.far or motion.turns or motion.loaded_aside)):
+                and (motion.turns or motion.loaded_aside)):
             raise InputError(f"{_given(options, 'mesh_quality')}: it has no effect on this motion, for which auto is not the "
                              "hyperelastic model; leave it out.")
         return {"motion": motion}
