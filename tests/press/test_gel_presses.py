@@ -176,6 +176,10 @@ def test_a_turn_that_takes_the_lowest_pin_off_the_gel_is_refused_and_a_smaller_o
     with pytest.raises(InputError, match=r"Step 2 of the motion takes the object off gelsight_wonkdim: .* x 8.2, y"):
         gel.press(part, pose=np.zeros(6), motion="z -0.2; rz 180", label="")
     assert gel.press(part, pose=np.zeros(6), motion="z -0.2; rz 5", label="").normal_force_n[1] > 0
+    below = [0.0, -5.0, 0.0, 0.0, 0.0, 0.0]     # a quarter turn takes the pin down to y = -8.6, the other way up to -1.4
+    with pytest.raises(InputError, match=r"takes the object off gelsight_wonkdim: .* y -8.6 mm"):
+        gel.press(part, pose=below, motion="z -0.2; rz 90", label="")
+    assert gel.press(part, pose=below, motion="z -0.2; rz -90 in 6", label="").normal_force_n[-1] > 0
 
 
 def test_the_force_on_a_gelsight_mini_is_about_the_measured_one():

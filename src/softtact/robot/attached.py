@@ -36,7 +36,7 @@ from softtact.readout.registry import readings_of
 from softtact.robot.events import set_down
 from softtact.robot.gels import GelReadings, has_gel
 from softtact.robot.geoms import MM, body_mesh, contact_force, contacts_of, geoms_of, name_of, pose_of_frame, rigid_body_of
-from softtact.robot.scene import PAD_COLOUR, PAD_CONTACT, TORSION_M
+from softtact.robot.scene import PAD_COLOUR, PAD_CONTACT, TORSION_M, quaternion
 from softtact.robot.settings import number
 
 SOURCES = ("contacts", "poses")
@@ -366,7 +366,7 @@ class AttachedSensor:
 
 def _seven(pose):
     """Numbers (7,) of a pose, as a grasp's record has them: mm and a quaternion."""
-    return np.concatenate([pose.translation_mm, pose.rotation.as_quat(canonical=True, scalar_first=True)])
+    return np.concatenate([pose.translation_mm, quaternion(pose.rotation)])
 
 
 def _moved(before, now):

@@ -17,6 +17,7 @@ _FAMILY_COLOURS = {"elastic": colour("elastic"), "electrodes": "#b35806", "found
 _SHADES = {"smooth": 0.45, "stepped": 1.0}     # opacity of the bars
 _CROSSES = "x+1234"     # of elastic layers and of the foundation model, in turns
 _RINGS = "osD^v"        # of the hyperelastic model and of truths, in turns
+_MARGIN = 1.1           # of the largest error, to which the axis of a learning curve goes
 _SIGNS = {"undecided": "0.75", "holds": colour("hyperelastic"), "fails": colour("elastic")}
 
 
@@ -112,10 +113,11 @@ def draw_curve(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dic
         for model, own in table[(table.truth == truth) & (table.readout == readout)].groupby("model", sort=False):
             axes.plot(own.maps, own.error_share, "o-", ms=3, color=_FAMILY_COLOURS.get(model, "0.4"), label=model)
         axes.set_title(f"truth {truth}, {readout}", fontsize=9)
-        axes.set_ylim(bottom=0)
     for axes in grid[-1]:
         axes.set_xlabel("training maps")
-    for axes in grid[:, 0]:
+        axes.xaxis.get_major_locator().set_params(integer=True)
+    for axes, readout in zip(grid[:, 0], readouts, strict=True):
+        axes.set_ylim(0, _MARGIN * table.error_share[table.readout == readout].max())     # of the whole row
         axes.set_ylabel("error over mean reading (1)")
     grid[0, 0].legend(fontsize=7)
     save(figure, outputs["png"], outputs["svg"])
